@@ -1,0 +1,1 @@
+"""Robots, scenarios, experiments and budgets as YAML, and robot models; package data, no code."""

@@ -1,0 +1,1 @@
+"""Real devices, one file or folder each; `drivers.interface` is the ground floor that everyone shares."""

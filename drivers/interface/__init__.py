@@ -1,0 +1,1 @@
+"""What all of Trundle shares: samples, commands, mission, device contracts, geometry, kinematics, clock, seeds, errors."""

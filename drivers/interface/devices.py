@@ -1,0 +1,164 @@
+"""The contracts of the devices.  Real, simulated, emulated and recorded ones all stand behind these.
+
+Life of a device: constructed (nothing touched yet) -> `open()` -> used -> `stop()` -> `close()`.  `stop` and `close` are
+idempotent and work in every state, also before `open`, half-open and after an error.  Reading never blocks: `latest()`
+gives a camera's newest frame once, `drain()` every other device's samples since the last call.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar, Protocol, runtime_checkable
+
+from drivers.interface.commands import BaseLimits, BodyTwist, JointTrajectory
+from drivers.interface.kinematics import WheelKinematics
+from drivers.interface.samples import (
+    BaseSample,
+    DepthFrame,
+    ImuSample,
+    JointSample,
+    OperatorEvent,
+    RangeScan,
+    TruthSample,
+)
+from drivers.interface.settings import Settings
+
+
+class DeviceState(enum.Enum):
+    """Where in its life a device stands."""
+
+    CLOSED = "closed"
+    OPEN = "open"
+    FAULTED = "faulted"
+    ENDED = "ended"  # a recording that has been played to its end
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceHealth:
+    """What a device says of itself; counters run from `open`."""
+
+    device: str
+    state: DeviceState
+    fault: str = ""  # one sentence, empty when there is none
+    received: int = 0
+    dropped: int = 0  # failed its checksum, counter or range check, or lost on the way
+    overflowed: int = 0  # came faster than the loop drained
+    expired_commands: int = 0  # times the dead man at the last hop had to act
+    expected_period_ns: int = 0  # 0: the device has no fixed rate
+    battery_fraction: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceSetup:
+    """What the runtime hands to every driver: its name in the robot, the seed, the time, and the world if there is one."""
+
+    name: str
+    seed: int
+    now_ns: Callable[[], int]
+    world: object | None = None
+
+
+@runtime_checkable
+class Device(Protocol):
+    """What every device can do.  A driver class is built as `Driver(settings, setup)`."""
+
+    Settings: ClassVar[type[Settings]]
+
+    def open(self) -> None:
+        """Connect and start delivering.  Raises DeviceError with one sentence when it cannot."""
+        ...
+
+    def stop(self) -> None:
+        """Bring whatever moves to rest."""
+        ...
+
+    def close(self) -> None:
+        """Stop and let go of every resource."""
+        ...
+
+    def health(self) -> DeviceHealth:
+        """Say how it stands; never blocks, never raises."""
+        ...
+
+
+@runtime_checkable
+class DepthCamera(Device, Protocol):
+    """A depth camera."""
+
+    def latest(self) -> DepthFrame | None:
+        """Return the newest frame not yet returned, or None."""
+        ...
+
+
+@runtime_checkable
+class Imu(Device, Protocol):
+    """An inertial measurement unit; its samples are already turned into the base frame."""
+
+    def drain(self) -> tuple[ImuSample, ...]:
+        """Return every sample since the last call, oldest first."""
+        ...
+
+
+@runtime_checkable
+class RangeScanner(Device, Protocol):
+    """A planar range scanner."""
+
+    def drain(self) -> tuple[RangeScan, ...]:
+        """Return every scan since the last call, oldest first."""
+        ...
+
+
+@runtime_checkable
+class MobileBase(Device, Protocol):
+    """A wheeled base that follows body twists."""
+
+    @property
+    def limits(self) -> BaseLimits:
+        """What it may be asked."""
+        ...
+
+    @property
+    def kinematics(self) -> WheelKinematics:
+        """How its wheels and its twist belong together."""
+        ...
+
+    def command(self, twist: BodyTwist, expires_ns: int) -> None:
+        """Follow the twist until `expires_ns`, then stand still.  Raises DeviceError for a non-finite twist."""
+        ...
+
+    def drain(self) -> tuple[BaseSample, ...]:
+        """Return every sample since the last call, oldest first."""
+        ...
+
+
+@runtime_checkable
+class Arm(Device, Protocol):
+    """A serial arm that follows joint trajectories."""
+
+    def command(self, trajectory: JointTrajectory, expires_ns: int) -> None:
+        """Follow the trajectory until `expires_ns`, then decelerate to rest.  Raises DeviceError for non-finite knots."""
+        ...
+
+    def drain(self) -> tuple[JointSample, ...]:
+        """Return every sample since the last call, oldest first."""
+        ...
+
+
+@runtime_checkable
+class Operator(Device, Protocol):
+    """The person in charge."""
+
+    def drain(self) -> tuple[OperatorEvent, ...]:
+        """Return every action since the last call, oldest first."""
+        ...
+
+
+@runtime_checkable
+class TruthSource(Device, Protocol):
+    """Something that knows how things really are."""
+
+    def latest(self) -> TruthSample | None:
+        """Return the truth now, or None before the first."""
+        ...

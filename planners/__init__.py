@@ -1,0 +1,1 @@
+"""Planners, routers and shields, each behind its contract; one folder a planner."""

@@ -1,0 +1,62 @@
+"""The contract of a shield: the last say on a command, over any planner, inside what the limits can reach now."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar, Protocol, runtime_checkable
+
+from drivers.interface.commands import BaseLimits, BodyTwist, Command
+from drivers.interface.settings import Settings
+from drivers.interface.stateful import Stateful
+from estimators.belief import Belief
+from planners.planner import Diagnostics
+
+
+@dataclass(frozen=True, slots=True)
+class ShieldSetup:
+    """What the runtime hands to a shield."""
+
+    period_s: float
+    robot_radius_m: float
+    limits: BaseLimits | None
+
+
+@dataclass(frozen=True, slots=True)
+class ReachableSet:
+    """The twists that velocity, acceleration and jerk limits admit at this tick: a box, never empty."""
+
+    lowest: BodyTwist
+    highest: BodyTwist
+
+    def clip(self, twist: BodyTwist) -> BodyTwist:
+        """Return the nearest twist inside, axis by axis."""
+        low, high = self.lowest, self.highest
+        return BodyTwist(
+            min(max(twist.vx, low.vx), high.vx),
+            min(max(twist.vy, low.vy), high.vy),
+            min(max(twist.wz, low.wz), high.wz),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Filtered:
+    """What the shield made of a command."""
+
+    command: Command
+    intervened: bool = False
+    diagnostics: Diagnostics = field(default_factory=Diagnostics)
+
+
+@runtime_checkable
+class Shield(Stateful, Protocol):
+    """Filters commands.  Built as `Shield(settings, setup)`."""
+
+    Settings: ClassVar[type[Settings]]
+
+    def warm_up(self) -> None:
+        """Compile every kernel; called once before the first tick."""
+        ...
+
+    def filter(self, command: Command, belief: Belief, reachable: ReachableSet) -> Filtered:
+        """Return the safest command near the asked one whose twist lies in `reachable`."""
+        ...

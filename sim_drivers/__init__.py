@@ -1,0 +1,1 @@
+"""Stand-ins for every device, backed by one MuJoCo world."""
