@@ -1,0 +1,111 @@
+"""What stands and moves in a simulated world, as plain data; the world turns it into MuJoCo, the viewer into boxes."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.interface.geometry import SE2
+from drivers.interface.mission import Goal
+
+
+class Kind(enum.Enum):
+    """The two shapes that everything in a scene is made of."""
+
+    BOX = "box"
+    CYLINDER = "cylinder"
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """An upright solid: a box by its half extents x, y, z [m], or a cylinder by its radius (x and y alike) and half height."""
+
+    kind: Kind
+    half_extents_m: tuple[float, float, float]
+
+    @classmethod
+    def box(cls, length_m: float, width_m: float, height_m: float) -> Shape:
+        """Return a box by its full lengths along x, y and z."""
+        return cls(Kind.BOX, (length_m / 2, width_m / 2, height_m / 2))
+
+    @classmethod
+    def cylinder(cls, radius_m: float, height_m: float) -> Shape:
+        """Return an upright cylinder."""
+        return cls(Kind.CYLINDER, (radius_m, radius_m, height_m / 2))
+
+    @property
+    def bounding_radius_m(self) -> float:
+        """Radius of the smallest circle around the centre that holds the footprint."""
+        x, y, _ = self.half_extents_m
+        return x if self.kind is Kind.CYLINDER else float(np.hypot(x, y))
+
+
+@dataclass(frozen=True, slots=True)
+class StaticObstacle:
+    """Something that stands on the floor (or hangs at `base_z_m`) and never moves."""
+
+    name: str
+    shape: Shape
+    map_from_shape: SE2
+    base_z_m: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Mover:
+    """A walker, a door, a cart: a solid on a prescribed way, linear between key frames, resting before and after.
+
+    It is pushed by nothing.  Key frames are (t [s], x [m], y [m], yaw [rad]), shape (n, 4), with t increasing; a looped one
+    starts again after the last.
+    """
+
+    name: str
+    shape: Shape
+    keyframes: NDArray[np.float64]  # (n, 4)
+    looped: bool = False
+
+    def pose_at(self, time_s: float) -> SE2:
+        """Return the pose in the map at a time of the run."""
+        t = self._wrapped(time_s)
+        k = self.keyframes
+        x, y, yaw = (float(np.interp(t, k[:, 0], k[:, column])) for column in (1, 2, 3))
+        return SE2(x, y, yaw)
+
+    def velocity_at(self, time_s: float) -> tuple[float, float]:
+        """Return the velocity of the centre in the map [m/s]; at a key frame, of what follows."""
+        t, k = self._wrapped(time_s), self.keyframes
+        after = int(np.searchsorted(k[:, 0], t, side="right"))
+        if after == 0 or after == len(k):
+            return (0.0, 0.0)
+        step = k[after] - k[after - 1]
+        return (float(step[1] / step[0]), float(step[2] / step[0]))
+
+    def _wrapped(self, time_s: float) -> float:
+        start, end = float(self.keyframes[0, 0]), float(self.keyframes[-1, 0])
+        return start + (time_s - start) % (end - start) if self.looped and time_s > start else time_s
+
+
+@dataclass(frozen=True, slots=True)
+class Conveyor:
+    """A belt along its own x axis with free boxes on it; its top lies at the shape's full height."""
+
+    name: str
+    shape: Shape
+    map_from_belt: SE2
+    speed_m_s: float
+    items: tuple[StaticObstacle, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """A scenario that has been drawn for one seed."""
+
+    name: str
+    map_from_start: SE2
+    goals: tuple[Goal, ...]
+    time_limit_s: float
+    static: tuple[StaticObstacle, ...]
+    movers: tuple[Mover, ...] = ()
+    conveyors: tuple[Conveyor, ...] = ()
