@@ -54,6 +54,7 @@ class Planner(Stateful, Protocol):
     """
 
     Settings: ClassVar[type[Settings]]
+    default_shield: ClassVar[str]  # the shield it is meant to run under, where the configuration names none
 
     def warm_up(self) -> None:
         """Compile every kernel; called once before the first tick."""
