@@ -1,0 +1,57 @@
+# Every target works as the very first command after a clone; the environment is kept in .venv.
+
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+.PHONY: help demo test lint bench wheel clean
+
+STAMP := .venv/.stamp
+BIN := .venv/bin
+PACKAGES := drivers sim_drivers estimators planners runtime configs
+SUPPORTED := import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 12))
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+help:  ## list the targets
+	@echo "Trundle.  Targets (Python 3.11 or 3.12; PYTHON=/path/to/python chooses one):"
+	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-6s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+demo: $(STAMP)  ## drive the omni robot through the dynamic hallway and record it
+	$(BIN)/trundle run dynamic_hallway
+
+test: lint  ## what CI runs: format, lint, types, layers, tests
+	$(BIN)/python -m pytest -n 2
+
+lint: $(STAMP)  ## format, lint, types and layer contracts only
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: $(STAMP)  ## measure every figure beside its budget and its peer (ARGS="--only pacer" for some)
+	$(BIN)/python -m tests.benchmarks.run $(ARGS)
+
+wheel: $(STAMP)  ## build the wheel into dist/
+	rm -rf build
+	$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
+	@ls dist/*.whl
+
+clean:  ## remove the environment and everything built
+	rm -rf .venv build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	find $(PACKAGES) tests -name __pycache__ -prune -exec rm -rf {} +
+
+# A venv that another Python made is made anew; otherwise pip brings it up to the pins in place.
+$(STAMP): pyproject.toml constraints.txt
+	@set -eu; \
+	if ! $(BIN)/python -c '$(SUPPORTED)' 2>/dev/null; then \
+	  python=; \
+	  for candidate in $(or $(PYTHON),python3 python3.12 python3.11); do \
+	    if "$$candidate" -c '$(SUPPORTED)' 2>/dev/null; then python=$$candidate; break; fi; \
+	  done; \
+	  if [ -z "$$python" ]; then \
+	    echo "Trundle needs Python 3.11 or 3.12 and found neither as $(or $(PYTHON),python3, python3.12 or python3.11): set PYTHON=/path/to/it." >&2; \
+	    exit 1; \
+	  fi; \
+	  "$$python" -m venv --clear .venv; \
+	fi; \
+	echo "Installing Trundle and its tools into .venv (the first time takes a few minutes)"; \
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'; \
+	touch $@
