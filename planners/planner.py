@@ -44,7 +44,6 @@ class Plan:
     path_in_odom: NDArray[np.float64] = field(default_factory=no_path)  # (n, 2), what it means to do; for display only
     diagnostics: Diagnostics = field(default_factory=Diagnostics)
     latency_ns: int = 0  # how long after the belief the command is meant to take effect
-    failure: str = ""  # why there is no plan, as one sentence; set by the runtime when a planner raised
 
 
 @runtime_checkable

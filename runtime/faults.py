@@ -20,6 +20,7 @@ class Response(enum.IntEnum):
 class Fault(enum.Enum):
     """Everything that can go wrong, by name."""
 
+    STARTING = "starting"  # not every device has delivered its first sample yet
     SILENT_DEVICE = "silent_device"  # nothing came for too long
     STALE_SAMPLE = "stale_sample"  # it came, but was captured too long ago
     WRONG_RATE = "wrong_rate"
@@ -50,6 +51,7 @@ class Fault(enum.Enum):
 
 RESPONSE = MappingProxyType(
     {
+        Fault.STARTING: Response.STAND_DOWN,
         Fault.SILENT_DEVICE: Response.STAND_DOWN,
         Fault.STALE_SAMPLE: Response.STAND_DOWN,
         Fault.WRONG_RATE: Response.DECELERATE,

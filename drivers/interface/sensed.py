@@ -27,6 +27,7 @@ class Tick:
     skipped: int = 0  # grid times that passed unused just before this tick, because the loop was late
     lateness_ns: int = 0  # how long after the grid time the loop really woke
     last_work_ns: int = 0  # how long the work of the tick before took (in lockstep: as the latency model says)
+    last_plan_ns: int = 0  # how long its planner took (likewise)
 
 
 @dataclass(frozen=True, slots=True)

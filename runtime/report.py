@@ -1,0 +1,141 @@
+"""The run report: how it ended, what it cost and how long everything took, as JSON and as a table."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.table import Table
+
+from drivers.interface.errors import ConfigurationError
+from runtime.cycle import STAGES
+
+
+@dataclass(frozen=True, slots=True)
+class StageTime:
+    """Statistics of one stage's wall time [ms]."""
+
+    mean: float
+    p50: float
+    p99: float
+    max: float
+
+
+@dataclass(frozen=True, slots=True)
+class FaultCount:
+    """How often a fault was present, and when and where first."""
+
+    fault: str
+    ticks: int
+    first_tick: int
+    device: str
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingFigures:
+    """What the recorder did."""
+
+    path: str
+    ticks: int
+    dropped_ticks: int
+    dropped_views: int
+    bytes: int
+    bytes_per_s: float  # per second of the run's own time
+    queue_high_water: int
+    fault: str
+
+
+@dataclass(frozen=True, slots=True)
+class RunReport:
+    """Everything a run has to say; the field names are those of the JSON."""
+
+    outcome: str
+    planner: str
+    scenario: str
+    seed: int
+    ticks: int
+    missed_deadlines: int
+    min_clearance_m: float | None  # signed, surface to surface; none without ground truth
+    path_length_m: float
+    duration_s: float
+    odometry_error_m: float | None  # of the final pose
+    odometry_error_rad: float | None
+    stage_ms: dict[str, StageTime]
+    faults: tuple[FaultCount, ...]
+    realtime_factor: float  # run time over wall time
+    realtime_void: bool  # a paced world could not keep up: the run proves nothing about timing
+    realtime_refused: tuple[str, ...]
+    recording: RecordingFigures | None
+    error: str = ""  # what ended the run, when it was a failure of the software
+
+    def write(self, path: Path) -> None:
+        """Write the JSON.
+
+        Raises:
+            ConfigurationError: the path cannot be written.
+        """
+        text = json.dumps(_finite(asdict(self)), indent=2, allow_nan=False) + "\n"
+        try:
+            path.write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise ConfigurationError(f"--json {path} cannot be written: {error.strerror}") from error
+
+    def table(self) -> Table:
+        """Return the report as a table for the terminal."""
+        table = Table(title=f"{self.scenario}, {self.planner}, seed {self.seed}: {self.outcome}", show_header=False)
+        rows: list[tuple[str, str]] = [
+            ("duration", f"{self.duration_s:.2f} s, {self.ticks} ticks, {self.missed_deadlines} deadlines missed"),
+            ("path", f"{self.path_length_m:.2f} m"),
+            ("least clearance", _number(self.min_clearance_m, "m")),
+            ("odometry error", f"{_number(self.odometry_error_m, 'm')}, {_number(self.odometry_error_rad, 'rad')}"),
+            ("real-time factor", f"{self.realtime_factor:.1f}" + (" (void: below 0.98)" if self.realtime_void else "")),
+        ]
+        for name, time in self.stage_ms.items():
+            rows.append((f"{name} [ms]", f"p50 {time.p50:.3f}   p99 {time.p99:.3f}   max {time.max:.3f}"))
+        for fault in self.faults:
+            where = f"{fault.device}: " if fault.device else ""
+            rows.append((fault.fault, f"{fault.ticks} ticks, first at {fault.first_tick}: {where}{fault.detail}"))
+        rows += [("not granted", sentence) for sentence in self.realtime_refused]
+        if self.recording is not None:
+            rows.append(("recording", f"{self.recording.path} ({self.recording.bytes / 1e6:.1f} MB)"))
+        for name, value in rows:
+            table.add_row(name, value)
+        return table
+
+
+def stage_times(history_ns: NDArray[np.int64]) -> dict[str, StageTime]:
+    """Return the statistics of every stage from its durations [ns], shape (ticks, stages)."""
+    if len(history_ns) == 0:
+        return {}
+    ms = history_ns * 1e-6
+    return {
+        stage: StageTime(
+            float(ms[:, i].mean()),
+            float(np.percentile(ms[:, i], 50)),
+            float(np.percentile(ms[:, i], 99)),
+            float(ms[:, i].max()),
+        )
+        for i, stage in enumerate(STAGES)
+    }
+
+
+def finite_or_none(value: float) -> float | None:
+    """Return the value, or None where it says nothing (JSON has no NaN and no infinity)."""
+    return value if math.isfinite(value) else None
+
+
+def _number(value: float | None, unit: str) -> str:
+    return "unknown" if value is None else f"{value:.3f} {unit}"
+
+
+def _finite(value: object) -> object:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return finite_or_none(value) if isinstance(value, float) else value
