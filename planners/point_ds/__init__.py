@@ -1,0 +1,1 @@
+"""The point attractor of the clearance paper."""

@@ -1,0 +1,1 @@
+"""Routers: where the passage leads, on a larger scale than a planner looks."""

@@ -1,0 +1,121 @@
+"""Shortest path on the belief's grid, through what is free and what is unknown, towards a goal that may lie far outside it."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from drivers.interface.mission import Goal, Mission
+from drivers.interface.stateful import pack, unpack
+from estimators.belief import Belief, Lattice
+from planners.planner import no_path
+from planners.polyline import arc_length, resample
+from planners.router import Route, RouterSetup
+from planners.routers.grid_costs import CostGrid, GridCosts, cost_grid
+from planners.routers.grid_graph import GridGraph, trace
+from planners.routers.grid_kernels import pull_straight
+from planners.routers.window import remainder_outside, ring
+
+F64 = NDArray[np.float64]
+
+graph_of = lru_cache(maxsize=4)(GridGraph)  # a rolling window alternates between few shapes
+
+
+class GridRouter:
+    """Dijkstra's search on cell costs; the target is the border cell from which path and remainder together cost least."""
+
+    class Settings(GridCosts):
+        """Costs of the cells, and how the way is chosen."""
+
+        loyalty: float = Field(0.15, ge=0.0, lt=1.0, description="share by which the last route's cells are cheaper")
+        loyalty_radius_m: float = Field(0.25, ge=0.0, le=2.0, description="how far from the last route that holds")
+        detour_limit_m: float = Field(8.0, gt=0.0, le=1000.0, description="cost beyond the straight line that counts as blocked")
+
+    def __init__(self, settings: Settings, setup: RouterSetup) -> None:
+        """Start without a last route."""
+        self._settings = settings
+        self._radius_m = setup.robot_radius_m
+        self._last = no_path()  # (n, 2) in odom
+
+    def warm_up(self) -> None:
+        """Compile the path kernel."""
+        pull_straight(np.zeros((2, 2)), np.ones((2, 2)))
+
+    def route(self, belief: Belief, mission: Mission) -> Route:
+        """Return the route in odom, its length being the way to the border and the remainder beyond it."""
+        if mission.goal is None:
+            self._last = no_path()
+            return Route(None, no_path(), 0.0)
+        goal = belief.map_from_odom.inverse().apply(np.array([mission.goal.x_m, mission.goal.y_m]))
+        path, remainder_m = self._search(belief, goal, mission.goal)
+        self._last = path
+        blocked = len(path) == 0
+        length_m = 0.0 if blocked else float(arc_length(path)[-1]) + remainder_m
+        return Route((float(goal[0]), float(goal[1])), path, length_m, blocked)
+
+    def snapshot(self) -> bytes:
+        """Return the last route."""
+        return pack(last=self._last)
+
+    def restore(self, snapshot: bytes) -> None:
+        """Take over the last route."""
+        self._last = unpack(snapshot)["last"]
+
+    def _search(self, belief: Belief, goal: F64, wanted: Goal) -> tuple[F64, float]:
+        """Return path, shape (n, 2), empty when blocked, and remainder [m]."""
+        grid = cost_grid(belief, self._settings, self._radius_m)
+        lattice = grid.lattice
+        robot = np.array([belief.odom_from_base.x, belief.odom_from_base.y])
+        (start_row,), (start_column,) = lattice.cell_of(robot[None])
+        if not (0 <= start_row < lattice.rows and 0 <= start_column < lattice.columns):
+            return no_path(), 0.0
+        graph = graph_of(lattice.rows, lattice.columns, lattice.cell_m)
+        distance, predecessor = graph.search(self._with_loyalty(grid), int(start_row * lattice.columns + start_column))
+        target, remainder_m = _choose_target(lattice, distance, goal, max(wanted.tolerance_m, lattice.cell_m))
+        straight_m = float(np.hypot(*(goal - robot)))
+        if not distance[target] + remainder_m <= straight_m + self._settings.detour_limit_m:
+            return no_path(), 0.0
+        nodes = np.array(trace(predecessor, target))
+        cells = np.stack((nodes % lattice.columns, nodes // lattice.columns), axis=1).astype(np.float64)
+        path = np.array([lattice.x_m, lattice.y_m]) + (pull_straight(cells, grid.cost) + 0.5) * lattice.cell_m
+        path[0] = robot
+        if remainder_m < lattice.cell_m:  # the goal's own cell
+            path = np.concatenate((path[: max(1, len(path) - 1)], goal[None]))
+            remainder_m = 0.0
+        return resample(path, lattice.cell_m), remainder_m
+
+    def _with_loyalty(self, grid: CostGrid) -> F64:
+        """Return the costs, less near the last route: of two ways nearly as good, the one taken stays the better."""
+        if len(self._last) == 0:
+            return grid.cost
+        lattice, reach = grid.lattice, int(self._settings.loyalty_radius_m / grid.lattice.cell_m)
+        rows, columns = lattice.cell_of(self._last)
+        near = np.zeros(grid.cost.shape, dtype=np.bool_)
+        for down in range(-reach, reach + 1):
+            for right in range(-reach, reach + 1):
+                r, c = rows + down, columns + right
+                inside = (r >= 0) & (r < lattice.rows) & (c >= 0) & (c < lattice.columns)
+                near[r[inside], c[inside]] = True
+        return np.where(near, grid.cost * (1.0 - self._settings.loyalty), grid.cost)
+
+
+def _choose_target(lattice: Lattice, distance: F64, goal: F64, tolerance_m: float) -> tuple[int, float]:
+    """Return the node to go to and what remains from there [m]; the node's distance is infinite when there is none."""
+    (row,), (column,) = lattice.cell_of(goal[None])
+    if 0 <= row < lattice.rows and 0 <= column < lattice.columns:
+        x = lattice.x_m + (np.arange(lattice.columns) + 0.5) * lattice.cell_m - goal[0]
+        y = lattice.y_m + (np.arange(lattice.rows) + 0.5) * lattice.cell_m - goal[1]
+        remainder = np.hypot(*np.meshgrid(x, y)).ravel()
+        eligible = np.isfinite(distance) & (remainder <= tolerance_m)
+        target = int(np.argmin(np.where(eligible, remainder, np.inf)))
+        return target, float(remainder[target]) if eligible[target] else np.inf
+    rows, columns, side = ring(lattice.rows, lattice.columns)
+    border = lattice.centres(rows, columns)
+    low, high = lattice.centres(np.array([0, lattice.rows - 1]), np.array([0, lattice.columns - 1]))
+    nodes = rows * lattice.columns + columns
+    remainder = remainder_outside(border, side, low, high, goal)
+    best = int(np.argmin(distance[nodes] + remainder))
+    return int(nodes[best]), float(remainder[best])

@@ -1,0 +1,43 @@
+"""How far it still is from the border of the rolling window to a goal outside it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+F64 = NDArray[np.float64]
+
+
+def ring(rows: int, columns: int) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+    """Return row, column and side of the border cells, each shape (n,); sides 0 to 3: lower y, upper x, upper y, lower x."""
+    across, down = np.arange(columns), np.arange(rows)
+    row = np.concatenate((np.zeros_like(across), down, np.full_like(across, rows - 1), down))
+    column = np.concatenate((across, np.full_like(down, columns - 1), across, np.zeros_like(down)))
+    side = np.repeat(np.arange(4), (columns, rows, columns, rows))
+    return row, column, side
+
+
+def remainder_outside(points: F64, side: NDArray[np.intp], low: F64, high: F64, goal: F64) -> F64:
+    """Return the shortest way from border points to the goal that stays outside the window, shape (n,) [m].
+
+    Outside, nothing is known: the way is straight where the point's side faces the goal and leads round the window's corners
+    where it does not.  A straight line back through the window would pretend that what blocks the inside is not there.
+
+    Args:
+        points: on the border, shape (n, 2).
+        side: of each point as `ring` numbers them, shape (n,).
+        low: lower corner of the window, shape (2,).
+        high: upper corner, shape (2,).
+        goal: outside, shape (2,).
+    """
+    corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
+    faces = np.array([goal[1] < low[1], goal[0] > high[0], goal[1] > high[1], goal[0] < low[0]])
+    edge = np.hypot(*(np.roll(corners, -1, axis=0) - corners).T)  # of side k, from corner k to corner k + 1
+    corner = np.where(faces | np.roll(faces, 1), np.hypot(*(corners - goal).T), np.inf)
+    for _ in range(2):  # no corner is farther than two edges from one that sees the goal
+        corner = np.minimum(corner, np.minimum(np.roll(corner, -1) + edge, np.roll(corner + edge, 1)))
+    after = (side + 1) % 4
+    round_corners = np.minimum(
+        np.hypot(*(points - corners[side]).T) + corner[side], np.hypot(*(points - corners[after]).T) + corner[after]
+    )
+    return np.asarray(np.where(faces[side], np.hypot(*(points - goal).T), round_corners), dtype=np.float64)

@@ -1,0 +1,1 @@
+"""Shields: the last say on a command."""
