@@ -1,0 +1,121 @@
+"""The command line.  An error is one readable sentence; a traceback comes only with --debug."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from click import ClickException
+from click.exceptions import Abort
+from rich.console import Console
+from rich.table import Table
+
+from drivers.interface.errors import ConfigurationError, TrundleError
+from runtime import registry, yaml_files
+
+app = typer.Typer(
+    name="trundle",
+    help="Hardware-in-the-loop deployment runtime for mobile robots and arms.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+console = Console()
+errors = Console(stderr=True, soft_wrap=True)
+
+Config = Annotated[str, typer.Argument(metavar="CONFIG", help="path of a YAML file, or the name of a shipped scenario")]
+
+
+@app.callback()
+def _debug(debug: Annotated[bool, typer.Option(help="show the traceback of an error")] = False) -> None:
+    """Options of all commands; `main` reads --debug."""
+
+
+@app.command()
+def run(
+    config: Config,
+    changes: Annotated[list[str] | None, typer.Option("--set", metavar="a.b=c", help="override a value; repeatable")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="seed of everything that is drawn")] = 0,
+    duration: Annotated[float | None, typer.Option(min=0.0, help="end after so many seconds of the run's time")] = None,
+    realtime: Annotated[bool, typer.Option("--realtime", help="pace a simulated world by the host's clock")] = False,
+    live: Annotated[bool, typer.Option("--live", help="also stream to a Rerun viewer on loopback")] = False,
+    log: Annotated[Path | None, typer.Option(help="where to record; default: a new file in runs/")] = None,
+    no_log: Annotated[bool, typer.Option("--no-log", help="record nothing")] = False,
+    force: Annotated[bool, typer.Option("--force", help="overwrite an existing log")] = False,
+    json: Annotated[Path | None, typer.Option(help="write the run report here")] = None,
+) -> None:
+    """Run a mission: 0 accomplished, 1 not, 2 bad configuration, 3 device missing, 130 interrupted."""
+    # Imported here: `trundle list` and `--help` must not wait for MuJoCo, numba and Rerun.
+    import runtime.run as running  # noqa: PLC0415
+    from runtime import configuration  # noqa: PLC0415
+    from runtime.log_path import log_path  # noqa: PLC0415
+    from runtime.progress import RunProgress  # noqa: PLC0415
+
+    overrides = [*(changes or ())]
+    if realtime:
+        overrides.append("loop.realtime=true")
+    if duration is not None:
+        overrides.append(f"mission.time_limit_s={duration}")
+    loaded = configuration.load(config, tuple(overrides))
+    path = None if no_log else log_path(log, f"{loaded.scenario}-{loaded.planner.choice.name}-{seed}", force=force)
+    with RunProgress(console, loaded.scenario) as progress:
+        options = running.RunOptions(seed, path, live, progress.update, progress.ready)
+        result = running.run(loaded, options)
+    console.print(result.report.table())
+    if json is not None:
+        result.report.write(json)
+    if result.failure is not None and not isinstance(result.failure, KeyboardInterrupt):
+        raise result.failure
+    raise typer.Exit(running.exit_code(result))
+
+
+@app.command(name="list")
+def list_() -> None:
+    """List planners, routers, shields, estimators, drivers, scenarios, configurations and robots, with one line each."""
+    for part in registry.Part:
+        table = Table(title=f"{part.noun}s", title_justify="left", show_header=False, box=None, padding=(0, 2))
+        for name in registry.names(part):
+            table.add_row(f"  {name}", registry.first_line(part, name))
+        console.print(table)
+    for folder in ("scenarios", "robots"):
+        title = "configurations" if folder == "scenarios" else folder
+        console.print(f"{title} (configs/{folder})\n  {', '.join(yaml_files.shipped(folder))}")
+
+
+@app.command()
+def review(
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="a recording made by trundle run")],
+    at: Annotated[int | None, typer.Option(metavar="TICK", min=0, help="open at this tick")] = None,
+    screenshot: Annotated[Path | None, typer.Option(help="write a picture instead of opening a window")] = None,
+) -> None:
+    """Open a recording in the Rerun viewer, on loopback only."""
+    from runtime.log import review as reviewing  # noqa: PLC0415 - imported here, as above
+
+    reviewing.review(log, at, screenshot)
+
+
+def main() -> None:
+    """Run the command line and exit with its code."""
+    sys.exit(run_command(sys.argv[1:]))
+
+
+def run_command(arguments: list[str]) -> int:
+    """Run one command line; return the exit code.  Errors are printed on standard error."""
+    debug = "--debug" in arguments
+    plain = [argument for argument in arguments if argument != "--debug"]  # it may stand anywhere
+    try:
+        code = typer.main.get_command(app).main(plain, prog_name="trundle", standalone_mode=False)
+    except TrundleError as error:
+        if debug:
+            raise
+        errors.print(f"error: {error}", style="red", markup=False, highlight=False)
+        return error.exit_code
+    except ClickException as error:
+        error.show()
+        return ConfigurationError.exit_code
+    except (Abort, KeyboardInterrupt):
+        errors.print("interrupted", style="red")
+        return 130
+    return code if isinstance(code, int) else 0

@@ -1,0 +1,42 @@
+"""What the recording says about where it comes from, and the scene as plain shapes for the viewer."""
+
+from __future__ import annotations
+
+from drivers.interface.geometry import SE2
+from runtime.assembly import Assembly
+from runtime.log.header import RunHeader, SceneShape, code_version, library_versions, machine
+from sim_drivers.scene import Scene, Shape
+
+
+def run_header(assembly: Assembly, seed: int) -> RunHeader:
+    """Return the header of a run that is about to begin."""
+    configuration, (version, modified) = assembly.configuration, code_version()
+    return RunHeader(
+        configuration_yaml=configuration.as_yaml(),
+        seed=seed,
+        scenario=configuration.scenario,
+        planner=configuration.planner.choice.name,
+        robot_radius_m=configuration.robot.radius_m,
+        robot_height_m=configuration.robot.height_m,
+        static=() if assembly.scene is None else _static(assembly.scene),
+        movers=() if assembly.scene is None else _moving(assembly.scene),
+        code_version=version,
+        code_modified=modified,
+        libraries=library_versions(),
+        machine=machine(),
+    )
+
+
+def _static(scene: Scene) -> tuple[SceneShape, ...]:
+    shapes = [_shape(o.name, o.shape, o.map_from_shape, o.base_z_m) for o in scene.static]
+    return (*shapes, *(_shape(c.name, c.shape, c.map_from_belt) for c in scene.conveyors))
+
+
+def _moving(scene: Scene) -> tuple[SceneShape, ...]:
+    shapes = [_shape(m.name, m.shape, m.pose_at(0.0)) for m in scene.movers]
+    items = [item for conveyor in scene.conveyors for item in conveyor.items]
+    return (*shapes, *(_shape(item.name, item.shape, item.map_from_shape, item.base_z_m) for item in items))
+
+
+def _shape(name: str, shape: Shape, map_from_shape: SE2, base_z_m: float = 0.0) -> SceneShape:
+    return SceneShape(name, shape.kind.value, map_from_shape, shape.half_extents_m, base_z_m=base_z_m)

@@ -1,0 +1,189 @@
+"""Runs a mission from start to report; whatever happens, the robot is stopped, the recording closed and the report made."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from drivers.interface.errors import TrundleError
+from runtime.assembly import Assembly, assemble
+from runtime.configuration import Configuration
+from runtime.cycle import Cycle
+from runtime.fault_board import FaultBoard
+from runtime.faults import Fault, FaultReport
+from runtime.guards import guarded_route, guarded_update
+from runtime.interrupt import interruptible
+from runtime.log.recorder import Recorder, RecorderReport
+from runtime.loop import Stages, run_loop
+from runtime.pacer import Pacer
+from runtime.provenance import run_header
+from runtime.realtime import realtime
+from runtime.referee import Outcome, Referee
+from runtime.report import FaultCount, RecordingFigures, RunReport, finite_or_none, stage_times
+from runtime.stopwatch import Stopwatch
+
+LOWEST_REALTIME_FACTOR = 0.98
+
+
+@dataclass(frozen=True, slots=True)
+class RunOptions:
+    """What the command line adds to the configuration."""
+
+    seed: int = 0
+    log: Path | None = None
+    live: bool = False
+    progress: Callable[[Cycle], None] = lambda _: None
+    ready: Callable[[Assembly], None] = lambda _: None  # called once, just before the first tick
+
+
+@dataclass(frozen=True, slots=True)
+class RunResult:
+    """The report, and what broke the run if something did."""
+
+    report: RunReport
+    failure: BaseException | None = None
+
+
+def run(configuration: Configuration, options: RunOptions) -> RunResult:
+    """Run the configured mission.
+
+    Raises:
+        ConfigurationError: parts do not fit together; nothing was opened.
+        DeviceError: a device cannot be opened; everything is closed again.
+    """
+    assembly = assemble(configuration, options.seed)
+    assembly.warm_up()
+    recorder = Recorder(
+        options.log, configuration.log, run_header(assembly, options.seed), lockstep=assembly.lockstep, live=options.live
+    )
+    return _Run(assembly, options, recorder).result()
+
+
+class _Run:
+    """One run; its methods are its phases."""
+
+    def __init__(self, assembly: Assembly, options: RunOptions, recorder: Recorder) -> None:
+        self._assembly = assembly
+        self._options = options
+        self._recorder = recorder
+        self._stopwatch = Stopwatch()
+        self._refused: tuple[str, ...] = ()
+        self._wall_s = 0.0
+
+    def result(self) -> RunResult:
+        failure: BaseException | None = None
+        with ExitStack() as closing, interruptible() as interrupted:
+            referee = self._referee(interrupted)
+            closing.callback(self._assembly.runner.close)
+            self._recorder.open()
+            closing.callback(self._recorder.close)
+            self._assembly.robot.open()
+            closing.callback(self._assembly.robot.close)
+            pacer = self._assembly.pacer()
+            try:
+                self._drive(pacer, referee)
+            except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - the report must be made; it is raised after that
+                failure = error
+            finally:
+                self._assembly.robot.stop()
+        return RunResult(self._report(pacer, referee, self._recorder.close(), failure), failure)
+
+    def _referee(self, interrupted: Callable[[], bool]) -> Referee:
+        return Referee(
+            self._assembly.mission,
+            time_limit_s=self._assembly.time_limit_s,
+            give_up_after_s=self._assembly.configuration.supervisor.give_up_after_s,
+            interrupted=interrupted,
+            progress=self._options.progress,
+        )
+
+    def _drive(self, pacer: Pacer, referee: Referee) -> None:
+        assembly = self._assembly
+        pacer.measured_plan_ns = self._stopwatch.plan_ns
+        stages = Stages(
+            sense=assembly.robot.read,
+            estimate=guarded_update(assembly.estimator, assembly.board),
+            route=guarded_route(assembly.router, assembly.board),
+            plan=assembly.runner.plan,
+            admit=assembly.supervisor.admit,
+            write=assembly.robot.write,
+            record=recording(self._recorder, assembly.board),
+        )
+        with realtime(assembly.configuration.loop.system) as self._refused:
+            self._options.ready(assembly)
+            start_s = time.perf_counter()
+            try:
+                run_loop(pacer, stages, self._stopwatch, referee.is_over)
+            finally:
+                self._wall_s = time.perf_counter() - start_s
+
+    def _report(self, pacer: Pacer, referee: Referee, recorded: RecorderReport, failure: BaseException | None) -> RunReport:
+        assembly, tally = self._assembly, referee.tally
+        outcome = referee.outcome or Outcome.STOPPED
+        if isinstance(failure, KeyboardInterrupt):
+            outcome = Outcome.INTERRUPTED
+        factor = tally.duration_s / self._wall_s if self._wall_s else 0.0
+        return RunReport(
+            outcome=outcome.value,
+            planner=assembly.configuration.planner.choice.name,
+            scenario=assembly.configuration.scenario,
+            seed=self._options.seed,
+            ticks=tally.ticks,
+            missed_deadlines=pacer.missed,
+            min_clearance_m=finite_or_none(tally.min_clearance_m),
+            path_length_m=tally.path_length_m,
+            duration_s=tally.duration_s,
+            odometry_error_m=finite_or_none(tally.odometry_error_m),
+            odometry_error_rad=finite_or_none(tally.odometry_error_rad),
+            stage_ms=stage_times(self._stopwatch.history_ns),
+            faults=tuple(
+                FaultCount(fault.value, ticks, tally.first[fault][0], tally.first[fault][1].device, tally.first[fault][1].detail)
+                for fault, ticks in tally.faults.items()
+            ),
+            realtime_factor=factor,
+            realtime_void=not assembly.lockstep and assembly.world is not None and self._fell_behind(factor),
+            realtime_refused=self._refused,
+            recording=_figures(self._options.log, recorded, tally.duration_s),
+            error="" if failure is None else f"{type(failure).__name__}: {failure}",
+        )
+
+    def _fell_behind(self, factor: float) -> bool:
+        return factor < LOWEST_REALTIME_FACTOR and self._wall_s > 1.0
+
+
+def recording(recorder: Recorder, board: FaultBoard) -> Callable[[Cycle], None]:
+    """Return `recorder.record` that leaves word on the fault board when the log has become unwritable."""
+
+    def record(cycle: Cycle) -> None:
+        recorder.record(cycle)
+        sentence = recorder.fault()
+        if sentence:
+            board.post(FaultReport(Fault.LOG_UNWRITABLE, "recorder", sentence))
+
+    return record
+
+
+def _figures(path: Path | None, recorded: RecorderReport, duration_s: float) -> RecordingFigures | None:
+    if path is None:
+        return None
+    return RecordingFigures(
+        path=str(path),
+        ticks=recorded.written_ticks,
+        dropped_ticks=recorded.dropped_ticks,
+        dropped_views=recorded.dropped_views,
+        bytes=recorded.bytes_written,
+        bytes_per_s=recorded.bytes_written / duration_s if duration_s else 0.0,
+        queue_high_water=recorded.queue_high_water,
+        fault=recorded.fault,
+    )
+
+
+def exit_code(result: RunResult) -> int:
+    """Return what the command line exits with."""
+    if isinstance(result.failure, TrundleError):
+        return result.failure.exit_code
+    codes = {Outcome.REACHED.value: 0, Outcome.INTERRUPTED.value: 130}
+    return codes.get(result.report.outcome, 1)
