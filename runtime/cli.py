@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -10,10 +11,12 @@ import typer
 from click import ClickException
 from click.exceptions import Abort
 from rich.console import Console
+from rich.progress import Progress
 from rich.table import Table
 
 from drivers.interface.errors import ConfigurationError, TrundleError
 from runtime import registry, yaml_files
+from runtime.report import write_text
 
 app = typer.Typer(
     name="trundle",
@@ -71,15 +74,44 @@ def run(
     raise typer.Exit(running.exit_code(result))
 
 
+@app.command()
+def evaluate(
+    experiment: Annotated[str, typer.Argument(metavar="EXPERIMENT", help="path, or the name of a shipped experiment")],
+    seeds: Annotated[int | None, typer.Option(min=1, help="run seeds 0 to N - 1; default: the experiment's")] = None,
+    jobs: Annotated[int, typer.Option(min=1, help="runs side by side")] = os.cpu_count() or 1,
+    changes: Annotated[list[str] | None, typer.Option("--set", metavar="a.b=c", help="override a value in every run")] = None,
+    json: Annotated[Path | None, typer.Option(help="write every run's report here")] = None,
+    markdown: Annotated[Path | None, typer.Option(help="write the table here as Markdown")] = None,
+) -> None:
+    """Run an experiment over its seeds and print its table beside the published figures."""
+    from runtime import experiment as experiments  # noqa: PLC0415 - imported here, as above
+    from runtime import experiment_table  # noqa: PLC0415
+
+    loaded = experiments.load_experiment(experiment)
+    todo = experiments.cases(loaded, seeds, tuple(changes or ()))
+    with Progress(console=console) as progress:
+        task = progress.add_task(loaded.title, total=len(todo))
+        reports = experiments.run_all(todo, jobs, lambda case, report: progress.advance(task))
+    rows = experiment_table.rows(loaded, reports)
+    table = Table(*experiment_table.HEAD, title=loaded.title)
+    for row in rows:
+        table.add_row(*row.cells())
+    console.print(table)
+    if json is not None:
+        write_text(json, experiment_table.as_json(reports))
+    if markdown is not None:
+        write_text(markdown, experiment_table.markdown(rows))
+
+
 @app.command(name="list")
 def list_() -> None:
-    """List planners, routers, shields, estimators, drivers, scenarios, configurations and robots, with one line each."""
+    """List everything that a name can choose, with one line each, and the shipped configurations, robots and experiments."""
     for part in registry.Part:
         table = Table(title=f"{part.noun}s", title_justify="left", show_header=False, box=None, padding=(0, 2))
         for name in registry.names(part):
             table.add_row(f"  {name}", registry.first_line(part, name))
         console.print(table)
-    for folder in ("scenarios", "robots"):
+    for folder in ("scenarios", "robots", "experiments"):
         title = "configurations" if folder == "scenarios" else folder
         console.print(f"{title} (configs/{folder})\n  {', '.join(yaml_files.shipped(folder))}")
 

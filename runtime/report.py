@@ -79,11 +79,7 @@ class RunReport:
         Raises:
             ConfigurationError: the path cannot be written.
         """
-        text = json.dumps(_finite(asdict(self)), indent=2, allow_nan=False) + "\n"
-        try:
-            path.write_text(text, encoding="utf-8")
-        except OSError as error:
-            raise ConfigurationError(f"--json {path} cannot be written: {error.strerror}") from error
+        write_text(path, json.dumps(_finite(asdict(self)), indent=2, allow_nan=False) + "\n")
 
     def table(self) -> Table:
         """Return the report as a table for the terminal."""
@@ -106,6 +102,14 @@ class RunReport:
         for name, value in rows:
             table.add_row(name, value)
         return table
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a result that the user asked for.  Raises ConfigurationError when the path cannot be written."""
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ConfigurationError(f"{path} cannot be written: {error.strerror}") from error
 
 
 def stage_times(history_ns: NDArray[np.int64]) -> dict[str, StageTime]:

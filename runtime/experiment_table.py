@@ -1,0 +1,69 @@
+"""The table of an experiment: how runs ended and what they cost, per configuration and variant, beside what was published."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from statistics import fmean
+
+from runtime.experiment import Case, Experiment
+from runtime.report import RunReport
+
+HEAD = ("scenario", "variant", "reached", "collided", "timed out", "stopped", "published collisions", "least clearance", "time")
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One configuration with one variant, over all seeds."""
+
+    configuration: str
+    variant: str
+    runs: int
+    outcomes: Counter[str]
+    published_percent: float | None
+    mean_min_clearance_m: float | None
+    mean_time_to_goal_s: float | None  # over the runs that reached it
+
+    def cells(self) -> tuple[str, ...]:
+        """Return the texts of the table's cells, in the order of HEAD."""
+        counts = [f"{self.outcomes[name]}/{self.runs}" for name in ("reached", "collided", "timed_out", "stopped")]
+        published = "" if self.published_percent is None else f"{self.published_percent:g} %"
+        clearance = "" if self.mean_min_clearance_m is None else f"{self.mean_min_clearance_m:.2f} m"
+        duration = "" if self.mean_time_to_goal_s is None else f"{self.mean_time_to_goal_s:.1f} s"
+        return (self.configuration, self.variant, *counts, published, clearance, duration)
+
+
+def rows(experiment: Experiment, reports: dict[Case, RunReport]) -> tuple[Row, ...]:
+    """Return one row per configuration and variant, in the experiment's order."""
+    grouped: dict[tuple[str, str], list[RunReport]] = {}
+    for case, report in reports.items():
+        grouped.setdefault((case.configuration, case.variant), []).append(report)
+    return tuple(_row(experiment, configuration, variant, group) for (configuration, variant), group in grouped.items())
+
+
+def markdown(table: Iterable[Row]) -> str:
+    """Return the table as Markdown."""
+    lines = [f"| {' | '.join(HEAD)} |", "|" + "---|" * len(HEAD)]
+    lines += [f"| {' | '.join(row.cells())} |" for row in table]
+    return "\n".join(lines) + "\n"
+
+
+def as_json(reports: dict[Case, RunReport]) -> str:
+    """Return every run's report as JSON."""
+    return json.dumps([{"variant": case.variant} | asdict(report) for case, report in reports.items()], indent=1)
+
+
+def _row(experiment: Experiment, configuration: str, variant: str, group: list[RunReport]) -> Row:
+    clearances = [report.min_clearance_m for report in group if report.min_clearance_m is not None]
+    times = [report.duration_s for report in group if report.outcome == "reached"]
+    return Row(
+        configuration,
+        variant,
+        len(group),
+        Counter(report.outcome for report in group),
+        experiment.published_collision_percent.get(configuration, {}).get(variant),
+        fmean(clearances) if clearances else None,
+        fmean(times) if times else None,
+    )
