@@ -26,7 +26,7 @@ lint: $(STAMP)  ## format, lint, types and layer contracts only
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: $(STAMP)  ## measure every figure beside its budget and its peer (ARGS="--only pacer" for some)
+bench: $(STAMP)  ## measure every figure beside its budget and its peer (ARGS=pacer for some)
 	$(BIN)/python -m tests.benchmarks.run $(ARGS)
 
 wheel: $(STAMP)  ## build the wheel into dist/

@@ -5,7 +5,7 @@
 """
 
 import ctypes
-import ctypes.util
+import errno
 import os
 import time
 from typing import Protocol
@@ -48,11 +48,8 @@ class RealClock:
 
     def __init__(self) -> None:
         """Find `clock_nanosleep` in the C library."""
-        libc = ctypes.CDLL(ctypes.util.find_library("c"), use_errno=True)
-        self._sleep = libc.clock_nanosleep
+        self._sleep = ctypes.CDLL(None).clock_nanosleep
         self._sleep.argtypes = (ctypes.c_int, ctypes.c_int, ctypes.POINTER(_Timespec), ctypes.c_void_p)
-        self._deadline = _Timespec()
-        self._deadline_ref = ctypes.byref(self._deadline)
 
     def now_ns(self) -> int:
         """Return the host's monotonic time [ns]."""
@@ -64,9 +61,9 @@ class RealClock:
         Raises:
             OSError: the system refused to sleep.
         """
-        self._deadline.seconds, self._deadline.nanoseconds = divmod(deadline_ns, 1_000_000_000)
-        while error := self._sleep(time.CLOCK_MONOTONIC, _TIMER_ABSTIME, self._deadline_ref, None):
-            if error != 4:  # EINTR: Python runs its signal handler between bytecodes, then we sleep on
+        deadline = _Timespec(*divmod(max(deadline_ns, 0), 1_000_000_000))  # one a call: threads may share a clock
+        while error := self._sleep(time.CLOCK_MONOTONIC, _TIMER_ABSTIME, deadline, None):
+            if error != errno.EINTR:  # Python runs its signal handler between bytecodes, then we sleep on
                 raise OSError(error, os.strerror(error))
 
 
