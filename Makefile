@@ -7,6 +7,7 @@ SHELL := /bin/bash
 STAMP := .venv/.stamp
 BIN := .venv/bin
 PACKAGES := drivers sim_drivers estimators planners runtime configs
+PYTHONS := python3 python3.12 python3.11
 SUPPORTED := import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 12))
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
@@ -43,11 +44,11 @@ $(STAMP): pyproject.toml constraints.txt
 	@set -eu; \
 	if ! $(BIN)/python -c '$(SUPPORTED)' 2>/dev/null; then \
 	  python=; \
-	  for candidate in $(or $(PYTHON),python3 python3.12 python3.11); do \
+	  for candidate in $(or $(PYTHON),$(PYTHONS)); do \
 	    if "$$candidate" -c '$(SUPPORTED)' 2>/dev/null; then python=$$candidate; break; fi; \
 	  done; \
 	  if [ -z "$$python" ]; then \
-	    echo "Trundle needs Python 3.11 or 3.12 and found neither as $(or $(PYTHON),python3, python3.12 or python3.11): set PYTHON=/path/to/it." >&2; \
+	    echo "Trundle needs Python 3.11 or 3.12 and found neither as: $(or $(PYTHON),$(PYTHONS)).  Set PYTHON=/path/to/it." >&2; \
 	    exit 1; \
 	  fi; \
 	  "$$python" -m venv --clear .venv; \
