@@ -1,0 +1,99 @@
+"""From returns and ray ends to the three labels: free space by Bresenham's lines, hidden surfaces found by the same lines.
+
+Source: Cui, Deng, Wang, appendix D.3, steps 5 and 6.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from estimators.belief import FREE, OCCUPIED, U8, UNKNOWN
+
+FREE_END = np.uint8(1)  # a ray ends here that was still unobstructed
+HIT_END = np.uint8(2)  # a ray ends here at a surface
+
+Occupied = NDArray[Any]  # (rows, columns) uint8, 1 or 0
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _step(row: int, column: int, error: int, rows: int, columns: int, up: int, right: int) -> tuple[int, int, int]:
+    """Take one step of Bresenham's line that spans `rows` and `columns` cells in the directions `up` and `right`."""
+    twice = 2 * error
+    if twice > -rows:
+        error -= rows
+        column += right
+    if twice < columns:
+        error += columns
+        row += up
+    return row, column, error
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _trace_free(occupied: Occupied, label: U8, row0: int, column0: int, row1: int, column1: int, with_end: bool) -> None:
+    """Mark the line's cells free up to its end, or up to the first occupied cell; it never slips between two diagonal ones."""
+    rows, columns = abs(row1 - row0), abs(column1 - column0)
+    up, right = (1 if row1 > row0 else -1), (1 if column1 > column0 else -1)
+    row, column, error = row0, column0, columns - rows
+    while not occupied[row, column]:
+        at_end = row == row1 and column == column1
+        if not at_end or with_end:
+            label[row, column] = FREE
+        if at_end:
+            return
+        old_row, old_column = row, column
+        row, column, error = _step(row, column, error, rows, columns, up, right)
+        if row != old_row and column != old_column and occupied[old_row, column] and occupied[row, old_column]:
+            return
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _touches(occupied: Occupied, row: int, column: int) -> bool:
+    """Tell whether the cell or one of its eight neighbours is occupied."""
+    for r in range(max(row - 1, 0), min(row + 2, occupied.shape[0])):
+        for c in range(max(column - 1, 0), min(column + 2, occupied.shape[1])):
+            if occupied[r, c]:
+                return True
+    return False
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def is_hidden(occupied: Occupied, row0: int, column0: int, row1: int, column1: int) -> bool:
+    """Tell whether another surface stands between the camera's cell (row0, column0) and the cell (row1, column1).
+
+    A surface seen at a shallow angle does not hide itself: a line must have left the first surface, by at least one cell
+    that does not touch an occupied one, before what follows counts as behind it.
+    """
+    rows, columns = abs(row1 - row0), abs(column1 - column0)
+    up, right = (1 if row1 > row0 else -1), (1 if column1 > column0 else -1)
+    row, column, error = row0, column0, columns - rows
+    met = False
+    while row != row1 or column != column1:
+        if occupied[row, column]:
+            met = True
+        elif met and not _touches(occupied, row, column):
+            return True
+        row, column, error = _step(row, column, error, rows, columns, up, right)
+    return False
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def label_cells(occupied: Occupied, ends: U8, row0: int, column0: int, label: U8) -> None:
+    """Write the labels of all cells as seen from the cell (row0, column0).
+
+    With O the occupied cells, B those behind them and F the traced ones: occupied is O without B, unknown is B, free is F
+    without B, and everything else is unknown.  Lines end at the first cell of O, so that F never reaches into B and only
+    cells of O have to be asked whether they are in B.
+    """
+    label[:] = UNKNOWN
+    for row in range(ends.shape[0]):
+        for column in range(ends.shape[1]):
+            if ends[row, column]:
+                _trace_free(occupied, label, row0, column0, row, column, (ends[row, column] & FREE_END) != 0)
+    for row in range(occupied.shape[0]):
+        for column in range(occupied.shape[1]):
+            if occupied[row, column]:
+                label[row, column] = UNKNOWN if is_hidden(occupied, row0, column0, row, column) else OCCUPIED

@@ -1,0 +1,47 @@
+"""How one frame's labels change what is remembered, cell by cell."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba import njit
+from numpy.typing import NDArray
+
+from estimators.belief import FREE, OCCUPIED, U8, UNKNOWN
+
+I64 = NDArray[Any]
+Flags = NDArray[Any]  # bool
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def fold(
+    label: U8,  # (rows, columns), remembered; all of these change in place
+    free_ns: I64,  # (rows, columns), when last seen free
+    occupied_ns: I64,  # (rows, columns), when last seen occupied, or in the blind zone since
+    since_ns: I64,  # (rows, columns), since when occupied without having been seen free
+    dynamic: Flags,  # (rows, columns), whether occupied by something that came
+    seen: U8,  # (rows, columns), the frame's labels
+    blind: Flags,  # (rows, columns), where the sensor looked but was too near to see
+    now_ns: int,
+    recent_ns: int,
+    settle_ns: int,
+    static_ns: int,
+    dynamic_ns: int,
+) -> None:
+    """Overwrite what was seen; keep what was not, occupied cells no longer than their retention."""
+    for row in range(label.shape[0]):
+        for column in range(label.shape[1]):
+            at = row, column
+            if seen[at] == FREE:
+                label[at], free_ns[at] = FREE, now_ns
+            elif seen[at] == OCCUPIED:
+                if label[at] != OCCUPIED:
+                    since_ns[at], dynamic[at] = now_ns, now_ns - free_ns[at] <= recent_ns
+                elif now_ns - since_ns[at] >= settle_ns:
+                    dynamic[at] = False
+                label[at], occupied_ns[at] = OCCUPIED, now_ns
+            elif label[at] == OCCUPIED:
+                if blind[at]:
+                    occupied_ns[at] = now_ns
+                elif now_ns - occupied_ns[at] > (dynamic_ns if dynamic[at] else static_ns):
+                    label[at] = UNKNOWN

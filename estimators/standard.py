@@ -1,0 +1,154 @@
+"""The standard estimator: odometry, labelled grid with memory, clearance field."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from drivers.interface.geometry import SE2
+from drivers.interface.samples import JointSample
+from drivers.interface.sensed import Sensed
+from drivers.interface.settings import Settings
+from drivers.interface.stateful import pack, unpack
+from estimators.belief import FREE, Belief, EstimatorFault, Track
+from estimators.clearance import ClearanceEstimator, ClearanceSettings
+from estimators.dead_reckoning import DeadReckoning, DeadReckoningSettings
+from estimators.depth_grid import DepthGrid, DepthGridSettings
+from estimators.estimator import EstimatorSetup
+from estimators.grid_memory import GridMemory, GridMemorySettings
+from estimators.joint_state import pack_joints, unpack_joints
+from estimators.labelling import FrameLabels, FrameSource
+from estimators.odometry import Odometry, OdometryEstimate, latest_valid_ns
+from estimators.scan_grid import ScanGrid, ScanGridSettings
+from estimators.truth_odometry import TruthOdometry
+from estimators.truth_tracks import tracks_from_truth
+
+
+class StandardSettings(Settings):
+    """What each part of the standard estimator is set to."""
+
+    pose: Literal["odometry", "truth"] = Field(default="odometry", description="where the pose comes from")
+    tracks: Literal["none", "truth"] = Field(default="none", description="where tracks of obstacles come from")
+    source: Literal["depth", "scan"] = Field(default="depth", description="which sensor the grid is made from")
+    cell_m: float = Field(default=0.05, ge=0.01, le=0.5, description="side of a cell of grid and clearance field")
+    odometry: DeadReckoningSettings = DeadReckoningSettings()
+    depth: DepthGridSettings = DepthGridSettings()
+    scan: ScanGridSettings = ScanGridSettings()
+    memory: GridMemorySettings = GridMemorySettings()
+    clearance: ClearanceSettings = ClearanceSettings()
+
+
+class StandardEstimator:
+    """Makes a `Belief` from wheels or device pose, one range sensor, and the truth where the settings say so.
+
+    Pose and twist are those of the tick.  The grid changes only when a frame comes: it and its window are those of the
+    frame's capture.  Without frames the window moves on only where the robot nears its border.
+    """
+
+    Settings: ClassVar[type[Settings]] = StandardSettings
+
+    def __init__(self, settings: StandardSettings, setup: EstimatorSetup) -> None:
+        """Start at the identity of odom, with nothing known but the ground under the robot."""
+        self._settings, self._setup = settings, setup
+        self._odometry = _odometry_of(settings, setup)
+        self._source: FrameSource = (
+            DepthGrid(settings.depth, settings.cell_m) if settings.source == "depth" else ScanGrid(settings.scan, settings.cell_m)
+        )
+        self._memory = GridMemory(settings.memory, settings.cell_m, setup.robot_radius_m)
+        self._clearance = ClearanceEstimator(settings.clearance)
+        self._grid = self._memory.grid
+        self._frame_ns: int | None = None  # capture time of the newest frame used
+        self._joints: JointSample | None = None
+
+    def warm_up(self) -> None:
+        """Compile every kernel; what is believed stays as it is."""
+        self._source.warm_up()
+        spare = GridMemory(self._settings.memory, self._settings.cell_m, self._setup.robot_radius_m)
+        spare.merge(FrameLabels(spare.grid, spare.grid.label == FREE), 0, SE2())
+
+    def update(self, sensed: Sensed) -> Belief:
+        """Fold in all samples and return the belief at the tick; bad input is a fault in it."""
+        odometry = self._odometry.update(sensed)
+        valid = self._see(sensed)
+        if self._clearance.field is None or self._memory.strays(odometry.odom_from_base):
+            self._memory.follow(odometry.odom_from_base)
+            self._refresh(self._frame_ns or 0)
+        if sensed.joints:
+            self._joints = sensed.joints[-1]
+        return self._belief(sensed, odometry, valid)
+
+    def _see(self, sensed: Sensed) -> bool:
+        """Fold in the frame that came, if one did; False: it could not be used."""
+        stamp = self._source.stamp(sensed)
+        if stamp is None:
+            return True
+        captured_ns = stamp.captured_ns
+        if captured_ns > latest_valid_ns(sensed) or (self._frame_ns is not None and captured_ns <= self._frame_ns):
+            return False
+        pose = self._odometry.pose_at(captured_ns)
+        frame = self._source.see(sensed, pose)
+        if frame is None:
+            return False
+        self._memory.merge(frame, captured_ns, pose)
+        self._frame_ns = captured_ns
+        self._refresh(captured_ns)
+        return True
+
+    def _refresh(self, stamp_ns: int) -> None:
+        self._grid = self._memory.grid
+        self._clearance.update(self._grid, stamp_ns)
+
+    def _belief(self, sensed: Sensed, odometry: OdometryEstimate, valid: bool) -> Belief:
+        field = self._clearance.field
+        assert field is not None  # `update` has seen to it
+        stamp_ns = sensed.tick.start_ns
+        joints_ns = None if self._joints is None else self._joints.stamp.captured_ns
+        captures = (odometry.newest_capture_ns, self._frame_ns, joints_ns)
+        return Belief(
+            tick=sensed.tick.index,
+            stamp_ns=stamp_ns,
+            odom_from_base=odometry.odom_from_base,
+            map_from_odom=self._setup.map_from_start,
+            twist=odometry.twist,
+            covariance=odometry.covariance,
+            grid=self._grid,
+            clearance=field,
+            tracks=self._tracks(sensed),
+            joints=self._joints,
+            oldest_input_ns=min((captured_ns for captured_ns in captures if captured_ns is not None), default=stamp_ns),
+            faults=odometry.faults if valid or odometry.faults else (EstimatorFault.INVALID_INPUT,),
+        )
+
+    def _tracks(self, sensed: Sensed) -> tuple[Track, ...]:
+        if self._settings.tracks == "none" or sensed.truth is None:
+            return ()
+        return tracks_from_truth(sensed.truth, self._setup.map_from_start.inverse())
+
+    def snapshot(self) -> bytes:
+        """Return the whole state."""
+        return pack(
+            odometry=np.frombuffer(self._odometry.snapshot(), dtype=np.uint8),
+            memory=np.frombuffer(self._memory.snapshot(), dtype=np.uint8),
+            clearance=np.frombuffer(self._clearance.snapshot(), dtype=np.uint8),
+            frame_ns=np.array([] if self._frame_ns is None else [self._frame_ns], dtype=np.int64),
+            joints=pack_joints(self._joints),
+        )
+
+    def restore(self, snapshot: bytes) -> None:
+        """Take over a state."""
+        state = unpack(snapshot)
+        self._odometry.restore(state["odometry"].tobytes())
+        self._memory.restore(state["memory"].tobytes())
+        self._clearance.restore(state["clearance"].tobytes())
+        self._grid = self._memory.grid
+        self._frame_ns = int(state["frame_ns"][0]) if state["frame_ns"].size else None
+        self._joints = unpack_joints(state["joints"])
+
+
+def _odometry_of(settings: StandardSettings, setup: EstimatorSetup) -> Odometry:
+    odometry = settings.odometry
+    if settings.pose == "truth":
+        return TruthOdometry(setup.map_from_start, odometry.trail_s, odometry.extrapolation_max_s)
+    return DeadReckoning(odometry, setup.kinematics)
