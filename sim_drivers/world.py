@@ -12,6 +12,7 @@ from pydantic import Field
 from drivers.interface.devices import DeviceSetup
 from drivers.interface.errors import ConfigurationError, DeviceError, TrundleError
 from drivers.interface.settings import Settings
+from sim_drivers.mover_kernel import pack_movers, place_movers
 from sim_drivers.scene import Conveyor, Kind, Mover, Scene, Shape, StaticObstacle
 
 # Contact bits.  Two geoms touch when the contype of one meets the conaffinity of the other.
@@ -66,7 +67,7 @@ class MujocoWorld:
         self._due_ns = 0
         self._now_ns = 0
         self._step_ns = 0
-        self._mover_ids: list[int] = []
+        self._mover_frames, self._mover_spans = pack_movers((), ())
         self._belts: list[tuple[int, int, float]] = []
         self._model: Any = None
         self._data: Any = None
@@ -153,7 +154,8 @@ class MujocoWorld:
 
     def _bind(self) -> None:
         model, data = self._model, self._data
-        self._mover_ids = [int(model.body_mocapid[model.body(m.name).id]) for m in self.scene.movers]
+        mocap_ids = [int(model.body_mocapid[model.body(m.name).id]) for m in self.scene.movers]
+        self._mover_frames, self._mover_spans = pack_movers(self.scene.movers, mocap_ids)
         self._belts = []
         for conveyor in self.scene.conveyors:
             joint = model.joint(f"{conveyor.name}_belt")
@@ -173,14 +175,11 @@ class MujocoWorld:
         self._due_ns = min(self._next_ns, default=1 << 62)
 
     def _place_movers(self) -> None:
-        time_s = self._now_ns / SECOND_NS
-        for mover, mocap in zip(self.scene.movers, self._mover_ids, strict=True):
-            pose = mover.pose_at(time_s)
-            self._data.mocap_pos[mocap, :2] = pose.x, pose.y
-            self._data.mocap_quat[mocap] = _yaw_quaternion(pose.yaw)
+        data, time_s = self._data, self._now_ns / SECOND_NS
+        place_movers(time_s, self._mover_frames, self._mover_spans, data.mocap_pos, data.mocap_quat)
         for position, velocity, speed_m_s in self._belts:
             # A belt that moves on and is put back every step: contact friction sees its velocity, its place stays.
-            self._data.qpos[position], self._data.qvel[velocity] = 0.0, speed_m_s
+            data.qpos[position], data.qvel[velocity] = 0.0, speed_m_s
 
     def _check_physics(self) -> None:
         for kind in range(len(self._data.warning)):
