@@ -1,5 +1,6 @@
 """What a machine keeps about the repository itself."""
 
+import ast
 import importlib.metadata
 import re
 import shutil
@@ -40,6 +41,14 @@ def python_files() -> list[Path]:
     return [path for path in tracked_files() if path.suffix == ".py"]
 
 
+def normalised(distribution: str) -> str:
+    return re.sub(r"[-_.]+", "-", distribution).lower()
+
+
+def requirement_name(requirement: str) -> str:
+    return normalised(re.split(r"[^A-Za-z0-9_.-]", requirement)[0])
+
+
 @pytest.mark.parametrize("pattern", [REGISTRIES, MACHINE_PATHS], ids=["registry", "path"])
 def test_no_tracked_file_names_a_registry_or_a_machine(pattern):
     assert [str(path.relative_to(ROOT)) for path in ours() if pattern.search(path.read_bytes())] == []
@@ -48,10 +57,8 @@ def test_no_tracked_file_names_a_registry_or_a_machine(pattern):
 def test_pins_are_names_and_versions_only():
     lines = [line for line in (ROOT / "constraints.txt").read_text().splitlines() if not line.startswith("#")]
     assert [line for line in lines if not re.fullmatch(r"[A-Za-z0-9_.-]+==[A-Za-z0-9.]+", line)] == []
-    pinned = {re.sub(r"[-_.]+", "-", line.split("==")[0]).lower() for line in lines}
     wanted = [*PROJECT["dependencies"], *(item for extra in PROJECT["optional-dependencies"].values() for item in extra)]
-    named = {re.sub(r"[-_.]+", "-", re.split(r"[^A-Za-z0-9_.-]", item)[0]).lower() for item in wanted} - {"trundle"}
-    assert named - pinned == set()
+    assert {requirement_name(item) for item in wanted} - {"trundle"} - {requirement_name(line) for line in lines} == set()
 
 
 def test_the_licence_is_there_in_full():
@@ -85,6 +92,20 @@ def test_every_planner_folder_has_the_same_files(name):
     assert {"planner.py", "settings.py", "README.md"} <= {path.name for path in folder.iterdir()}
     decorated = [path.name for path in folder.glob("*.py") if "njit" in path.read_text()]
     assert decorated in ([], ["kernels.py"])  # compiled code has one place
+
+
+def test_every_import_is_declared_and_every_dependency_is_imported():
+    trees = [ast.parse(path.read_text()) for path in python_files() if path.relative_to(ROOT).parts[0] in PACKAGES]
+    nodes = [node for tree in trees for node in ast.walk(tree)]
+    modules = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    modules |= {node.module for node in nodes if isinstance(node, ast.ImportFrom) if node.module is not None}
+    foreign = {module.split(".")[0] for module in modules} - set(PACKAGES) - set(sys.stdlib_module_names)
+    providers = importlib.metadata.packages_distributions()
+    imported = {name: {normalised(distribution) for distribution in providers[name]} for name in foreign}
+    base = {requirement_name(item) for item in PROJECT["dependencies"]}
+    extras = {requirement_name(item) for items in PROJECT["optional-dependencies"].values() for item in items}
+    assert {name for name, distributions in imported.items() if not distributions & (base | extras)} == set()
+    assert base - set().union(*imported.values()) == set()
 
 
 @pytest.mark.parametrize("package", PACKAGES)
