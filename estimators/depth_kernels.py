@@ -38,7 +38,8 @@ def collect_depth(
     """Count the returns inside the slab per cell and mark the cell in which each ray ends.
 
     A ray with a valid depth is known to be empty up to the return.  It counts up to where it hits inside the slab, leaves
-    the slab, or reaches the maximum range.  A pixel without a valid depth says nothing.
+    the slab, or reaches the maximum range.  A pixel without a valid depth says nothing; a ray that leaves the slab before
+    the minimum range is not worth following.
     """
     fx, fy, cx, cy = pinhole
     slab_low, slab_high = slab
@@ -62,6 +63,8 @@ def collect_depth(
             hit = slab_low <= height <= slab_high and z * z * planar_squared <= range_max * range_max
             if not hit:
                 leaves = (slab_high if rise > 0.0 else slab_low) / rise if rise != 0.0 else math.inf
+                if leaves < range_min:
+                    continue
                 z = min(leaves, range_max / math.sqrt(planar_squared))
             column, row = int(camera[0] + z * dx / cell_m), int(camera[1] + z * dy / cell_m)
             if hit:

@@ -84,16 +84,17 @@ def is_hidden(occupied: Occupied, row0: int, column0: int, row1: int, column1: i
 def label_cells(occupied: Occupied, ends: U8, row0: int, column0: int, label: U8) -> None:
     """Write the labels of all cells as seen from the cell (row0, column0).
 
-    With O the occupied cells, B those behind them and F the traced ones: occupied is O without B, unknown is B, free is F
-    without B, and everything else is unknown.  Lines end at the first cell of O, so that F never reaches into B and only
-    cells of O have to be asked whether they are in B.
+    With O the occupied cells, B those behind them and F the traced ones: O without B is occupied, F without B is free,
+    and everything else, B included, is unknown.
     """
     label[:] = UNKNOWN
     for row in range(ends.shape[0]):
         for column in range(ends.shape[1]):
             if ends[row, column]:
                 _trace_free(occupied, label, row0, column0, row, column, (ends[row, column] & FREE_END) != 0)
-    for row in range(occupied.shape[0]):
-        for column in range(occupied.shape[1]):
+    for row in range(ends.shape[0]):
+        for column in range(ends.shape[1]):
             if occupied[row, column]:
-                label[row, column] = UNKNOWN if is_hidden(occupied, row0, column0, row, column) else OCCUPIED
+                label[row, column] = OCCUPIED
+            if label[row, column] != UNKNOWN and is_hidden(occupied, row0, column0, row, column):
+                label[row, column] = UNKNOWN
