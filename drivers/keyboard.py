@@ -49,6 +49,7 @@ class KeyboardOperator:
     """
 
     Settings: ClassVar[type[Settings]] = KeyboardSettings
+    real_time: ClassVar[bool] = True  # a person cannot be simulated faster than he types
 
     def __init__(self, settings: KeyboardSettings, setup: DeviceSetup, descriptor: int | None = None) -> None:
         """Remember; `descriptor` is the terminal to read, standard input if None."""

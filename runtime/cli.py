@@ -8,8 +8,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from click import ClickException
-from click.exceptions import Abort
 from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
@@ -32,7 +30,7 @@ Config = Annotated[str, typer.Argument(metavar="CONFIG", help="path of a YAML fi
 
 
 @app.callback()
-def _debug(debug: Annotated[bool, typer.Option(help="show the traceback of an error")] = False) -> None:
+def _debug(debug: Annotated[bool, typer.Option("--debug", help="show the traceback of an error")] = False) -> None:
     """Options of all commands; `main` reads --debug."""
 
 
@@ -144,10 +142,11 @@ def run_command(arguments: list[str]) -> int:
             raise
         errors.print(f"error: {error}", style="red", markup=False, highlight=False)
         return error.exit_code
-    except ClickException as error:
-        error.show()
+    except typer.TyperException as error:  # wrong usage
+        if error.format_message():  # empty where the help was printed instead
+            errors.print(f"error: {error.format_message()}", style="red", markup=False, highlight=False)
         return ConfigurationError.exit_code
-    except (Abort, KeyboardInterrupt):
+    except (typer.Abort, KeyboardInterrupt):
         errors.print("interrupted", style="red")
         return 130
     return code if isinstance(code, int) else 0

@@ -62,7 +62,11 @@ class DeviceSetup:
 
 @runtime_checkable
 class Device(Protocol):
-    """What every device can do.  A driver class is built as `Driver(settings, setup)`."""
+    """What every device can do.  A driver class is built as `Driver(settings, setup)`.
+
+    One that lives in real time (hardware, an emulated device, a person) sets the class attribute `real_time = True`; the
+    loop is then paced by the host's clock.
+    """
 
     Settings: ClassVar[type[Settings]]
 
