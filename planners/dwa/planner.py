@@ -25,7 +25,6 @@ from planners.router import Route
 
 F64 = NDArray[np.float64]
 
-_SLACK_M = 0.02  # what noise may take from the clearance between two ticks
 _SOONEST_S = 0.3  # progress is judged no sooner than this
 
 
@@ -95,10 +94,10 @@ class DynamicWindow:
     def _surroundings(self, belief: Belief, here_m: float) -> Surroundings:
         """Return what arcs are laid through.
 
-        A robot that stands nearer than the margin may go where it is no narrower (by _SLACK_M at most, never below its radius).
+        A robot that stands nearer than the margin may still go where it is no narrower than here.
         """
         lattice, radius_m = belief.grid.lattice, self._setup.robot_radius_m
-        required_m = min(radius_m + self._settings.margin_m, max(here_m - _SLACK_M, min(here_m, radius_m)))
+        required_m = min(radius_m + self._settings.margin_m, here_m)
         body_m = self._settings.body_m if self._settings.stop_before_unknown else -1.0
         field, label = belief.clearance.clearance_m, belief.grid.label
         return Surroundings(field, label, lattice.x_m, lattice.y_m, lattice.cell_m, required_m, body_m)

@@ -16,7 +16,7 @@ class DynamicWindowSettings(Settings):
     horizon_s: float = Field(1.5, gt=0.0, le=10.0, description="how far an arc is rolled out")
     steps: int = Field(15, ge=2, le=200, description="points along an arc")
     look_ahead_m: float = Field(1.2, gt=0.0, le=10.0, description="farthest point of the route that is aimed at")
-    margin_m: float = Field(0.05, ge=0.0, le=1.0, description="kept free beyond the robot's radius")
+    margin_m: float = Field(0.10, ge=0.0, le=1.0, description="kept free beyond the robot's radius")
     reaction_time_s: float = Field(0.1, ge=0.0, le=2.0, description="driven on before a brake takes hold")
     stop_before_unknown: bool = Field(True, description="be able to stop before entering cells that were never seen")
     body_m: float = Field(0.25, ge=0.0, le=2.0, description="distance kept from the unknown; nearer cells are stood on already")

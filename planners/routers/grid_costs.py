@@ -18,7 +18,7 @@ class GridCosts(Settings):
     """How dear nearness and ignorance are; a metre through known, open space costs 1."""
 
     cell_m: float = Field(0.10, gt=0.0, le=1.0, description="cell that is searched, a multiple of the belief's cell")
-    margin_m: float = Field(0.05, ge=0.0, le=1.0, description="kept free beyond the robot's radius")
+    margin_m: float = Field(0.10, ge=0.0, le=1.0, description="kept free beyond the robot's radius")
     comfort_m: float = Field(0.40, gt=0.0, le=5.0, description="nearness costs extra up to this far beyond the margin")
     nearness_cost: float = Field(4.0, ge=0.0, le=100.0, description="extra cost of a metre right at the margin")
     unknown_cost: float = Field(0.3, ge=0.0, le=100.0, description="extra cost of a metre through unknown cells")

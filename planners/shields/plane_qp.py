@@ -96,12 +96,12 @@ def solve(normals: F64, bounds: F64, asked: F64, low: F64, high: F64) -> tuple[F
     if len(polygon) > 0:
         return np.minimum(np.maximum(nearest_in_polygon(polygon, asked), low), high), 0.0
     too_little, enough = 0.0, worst_violation(normals, bounds, clipped)
+    polygon = clipped.reshape(1, 2)  # what is known to be feasible with the slack `enough`
     while enough - too_little > 1e-9 * max(1.0, enough):
         middle = 0.5 * (too_little + enough)
-        if len(feasible_polygon(normals, bounds, middle, low, high)) > 0:
-            enough = middle
+        relaxed = feasible_polygon(normals, bounds, middle, low, high)
+        if len(relaxed) > 0:
+            enough, polygon = middle, relaxed
         else:
             too_little = middle
-    polygon = feasible_polygon(normals, bounds, enough, low, high)
-    nearest = nearest_in_polygon(polygon, asked)
-    return np.minimum(np.maximum(nearest, low), high), enough
+    return np.minimum(np.maximum(nearest_in_polygon(polygon, asked), low), high), enough
