@@ -44,7 +44,8 @@ class RayCaster:
                 f"geom '{geom.name or geom.id}' is a {kind}, which the depth camera cannot see; "
                 "it sees plane, box, cylinder, sphere, capsule and ellipsoid"
             )
-        self._sizes, self._extents = _sizes_and_extents(self._kinds, model.geom_size[self._ids])  # both (n, 3)
+        self._sizes = _sizes(self._kinds, model.geom_size[self._ids])  # (n, 3)
+        self._extents: F64 = model.geom_aabb[self._ids, 3:]  # (n, 3)
 
     def depth_image(self, data: Any, position: F64, rotation: F64, intrinsics: Intrinsics, far_m: float = np.inf) -> F32:
         """Return the depth along the optical axis [m], shape (height, width); inf where nothing is within `far_m`.
@@ -90,13 +91,9 @@ def visible_geoms(model: Any, without_subtree: str | None) -> NDArray[np.intp]:
     return np.flatnonzero(visible)
 
 
-def _sizes_and_extents(kinds: I64, sizes: F64) -> tuple[F64, F64]:
+def _sizes(kinds: I64, sizes: F64) -> F64:
     sizes = sizes.copy()
     sphere, plane = kinds == SPHERE, kinds == PLANE
     sizes[sphere] = sizes[sphere, :1]
     sizes[plane] = np.where(sizes[plane] > 0.0, sizes[plane], np.inf)
-    extents = sizes.copy()
-    round_ = (kinds == CYLINDER) | (kinds == CAPSULE)
-    extents[round_] = sizes[round_][:, [0, 0, 1]]
-    extents[kinds == CAPSULE, 2] += sizes[kinds == CAPSULE, 0]
-    return sizes, extents
+    return sizes

@@ -21,8 +21,6 @@ class SimSensor(ABC, Generic[S]):
     the buffer and is counted as overflowed.
     """
 
-    max_step_s = 0.01
-
     def __init__(
         self, setup: DeviceSetup, rate_hz: float, latency_s: float = 0.0, loss_probability: float = 0.0, capacity: int = 1
     ) -> None:
@@ -33,6 +31,7 @@ class SimSensor(ABC, Generic[S]):
         """
         self._setup = setup
         self._world = require_world(setup)
+        self.max_step_s = min(0.01, 1.0 / rate_hz)
         self._period_ns = round(SECOND_NS / rate_hz)
         self._latency_ns = round(latency_s * SECOND_NS)
         self._loss_probability = loss_probability
