@@ -51,21 +51,21 @@ class ImuNoise:
         self._white = _three_each(s.gyro_noise_rad_s_sqrt_hz, s.accel_noise_m_s2_sqrt_hz) * math.sqrt(rate_hz / 2.0)
         self._walk = _three_each(s.gyro_walk_rad_s2_sqrt_hz, s.accel_walk_m_s3_sqrt_hz) / math.sqrt(rate_hz)
         self._range = _three_each(s.gyro_range_rad_s, s.accel_range_m_s2)
-        self._resolution = _three_each(s.gyro_resolution_rad_s, s.accel_resolution_m_s2)
+        # Without a step of its own a value is as fine as a double is.
+        self._resolution = np.maximum(_three_each(s.gyro_resolution_rad_s, s.accel_resolution_m_s2), 1e-15)
         switch_on = stream(seed, f"{consumer}.bias").standard_normal(6)
         self._bias = _three_each(s.gyro_bias_rad_s, s.accel_bias_m_s2) * switch_on  # (6,)
-        self._draws: F64 = np.empty((0, 12))
+        self._error: F64 = np.empty((0, 6))  # of the samples of one block
 
     def spoil(self, truth: F64, sequence: int) -> F64:
         """Return what is measured instead of true rates [rad/s] and specific force [m/s^2], both in one array (6,)."""
         block, row = divmod(sequence, self._block)
         if row == 0:
-            self._draws = stream(self._seed, self._consumer, block).standard_normal((self._block, 12))
-        white, walk = self._draws[row, :6], self._draws[row, 6:]
-        self._bias = self._bias + self._walk * walk
-        measured = np.clip(truth + self._bias + self._white * white, -self._range, self._range)
-        counts = np.divide(measured, self._resolution, out=np.zeros(6), where=self._resolution > 0.0)
-        return np.where(self._resolution > 0.0, np.round(counts) * self._resolution, measured)
+            white, steps = stream(self._seed, self._consumer, block).standard_normal((2, self._block, 6))
+            bias = self._bias + np.cumsum(self._walk * steps, axis=0)
+            self._bias, self._error = bias[-1], bias + self._white * white
+        measured = np.minimum(np.maximum(truth + self._error[row], -self._range), self._range)
+        return np.asarray(np.rint(measured / self._resolution) * self._resolution, dtype=np.float64)
 
 
 def _three_each(gyro: float, accel: float) -> F64:
