@@ -9,6 +9,7 @@ from drivers.interface.geometry import BODY_FROM_OPTICAL, SE3
 from drivers.interface.samples import Intrinsics
 from sim_drivers.ray_caster import RayCaster
 
+PEER = "mj_multiRay"
 MAP_FROM_OPTICAL = SE3.from_euler(0.0, 0.0, 0.4, 0.0, 0.1, 0.0) @ BODY_FROM_OPTICAL
 
 
