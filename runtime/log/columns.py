@@ -1,0 +1,80 @@
+"""Columns of lists: each tick adds a list of values, a batch of ticks becomes one Arrow array per column."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import rerun as rr
+
+from runtime.log import rvl
+
+IMAGE_COMPONENT = rr.ComponentDescriptor(  # so that the viewer shows what replay consumes, stored once
+    "EncodedDepthImage:blob", archetype="rerun.archetypes.EncodedDepthImage", component_type="rerun.components.Blob"
+)
+
+
+class Kind(enum.Enum):
+    """What a column's values are."""
+
+    INT = pa.int64()
+    FLOAT = pa.float64()
+    FLAG = pa.bool_()
+    TEXT = pa.string()
+    IMAGE = pa.list_(pa.uint8())  # a 16-bit image, RVL-coded
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ArrowColumn:
+    """A finished Arrow array as Rerun's `send_columns` takes it: of values, or of times."""
+
+    descriptor: rr.ComponentDescriptor | str
+    array: pa.Array
+
+    def component_descriptor(self) -> rr.ComponentDescriptor | str:
+        """Return what Rerun knows the component by."""
+        return self.descriptor
+
+    def timeline_name(self) -> rr.ComponentDescriptor | str:
+        """Return the timeline's name."""
+        return self.descriptor
+
+    def as_arrow_array(self) -> pa.Array:
+        """Return the values."""
+        return self.array
+
+
+@dataclass(slots=True, eq=False)
+class Column:
+    """The values of one leaf over the ticks of a batch."""
+
+    name: str
+    kind: Kind
+    values: list[Any] = field(default_factory=list)
+    ends: list[int] = field(default_factory=list)  # of each tick's list among the values
+
+    def flat(self) -> pa.Array:
+        """Return the values of all ticks.
+
+        Raises:
+            pyarrow.ArrowInvalid, pyarrow.ArrowTypeError: a value is not what the column holds.
+        """
+        if self.kind is Kind.IMAGE:
+            return pa.array([rvl.encode(image) for image in self.values], self.kind.value)
+        return pa.array(self.values, self.kind.value)
+
+    def finished(self, flat: pa.Array) -> ArrowColumn:
+        """Return one list of values per tick."""
+        descriptor = IMAGE_COMPONENT if self.kind is Kind.IMAGE else rr.ComponentDescriptor(self.name)
+        offsets = pa.array(np.array([0, *self.ends], np.int32))
+        return ArrowColumn(descriptor, pa.ListArray.from_arrays(offsets, flat))
+
+
+def timelines(ticks: Sequence[int], starts_ns: Sequence[int]) -> list[ArrowColumn]:
+    """Return the two timelines of a batch: `tick`, and `mono`, the grid time of the tick [ns]."""
+    mono = pa.array(starts_ns, pa.int64()).cast(pa.duration("ns"))
+    return [ArrowColumn("tick", pa.array(ticks, pa.int64())), ArrowColumn("mono", mono)]

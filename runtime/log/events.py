@@ -1,0 +1,81 @@
+"""What is said in words: faults that come and go, changes of the response, what the operator did."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import rerun as rr
+
+from runtime.cycle import Cycle
+from runtime.faults import FaultReport, Response
+from runtime.log import colours
+from runtime.log.layers import Rows
+from runtime.log.sink import Sink
+
+EVENTS = "/view/events"
+RESPONSE = "/view/response"
+_LEVELS = {
+    Response.RUN: rr.TextLogLevel.INFO,
+    Response.HOLD: rr.TextLogLevel.INFO,
+    Response.DECELERATE: rr.TextLogLevel.WARN,
+    Response.STAND_DOWN: rr.TextLogLevel.ERROR,
+    Response.LATCH: rr.TextLogLevel.CRITICAL,
+}
+
+
+class Event(NamedTuple):
+    """One line of text."""
+
+    level: str
+    text: str
+
+
+class Events:
+    """Writes what has changed since the tick before."""
+
+    def __init__(self) -> None:
+        """Know of nothing yet."""
+        self._text: Rows[Event] = Rows(EVENTS, _texts)
+        self._state: Rows[str] = Rows(RESPONSE, _states, [(RESPONSE, _state_style())])
+        self._response: Response | None = None
+        self._faults: dict[tuple[str, str], FaultReport] = {}
+
+    def put(self, cycle: Cycle) -> None:
+        """Write what is new."""
+        tick, verdict = cycle.sensed.tick, cycle.verdict
+        for event in cycle.sensed.operator:
+            self._text.add(tick, Event(rr.TextLogLevel.INFO, f"operator: {event.action}"))
+        faults = {(report.fault.value, report.device): report for report in verdict.faults}
+        for key, report in faults.items():
+            if key not in self._faults:
+                self._text.add(tick, Event(_LEVELS[report.response], _sentence(report)))
+        for key, report in self._faults.items():
+            if key not in faults:
+                self._text.add(tick, Event(rr.TextLogLevel.INFO, f"over: {report.fault.value} {report.device}".rstrip()))
+        self._faults = faults
+        if verdict.response is not self._response:
+            self._response = verdict.response
+            self._state.add(tick, verdict.response.name)
+            self._text.add(tick, Event(_LEVELS[verdict.response], f"response: {verdict.response.name}"))
+
+    def send(self, sink: Sink) -> None:
+        """Send the rows and start a new batch."""
+        self._text.send(sink)
+        self._state.send(sink)
+
+
+def _sentence(report: FaultReport) -> str:
+    where = f" of {report.device}" if report.device else ""
+    return f"fault: {report.fault.value}{where}" + (f": {report.detail}" if report.detail else "")
+
+
+def _texts(events: list[Event]) -> rr.ComponentColumnList:
+    return rr.TextLog.columns(text=[event.text for event in events], level=[event.level for event in events])
+
+
+def _states(names: list[str]) -> rr.ComponentColumnList:
+    return rr.StateChange.columns(state=names)
+
+
+def _state_style() -> rr.AsComponents:
+    return rr.StateConfiguration(values=[response.name for response in Response], colors=colours.RESPONSES)

@@ -1,0 +1,68 @@
+"""What is known of a run before its first tick: provenance for the engineer, the static scene for the viewer."""
+
+from __future__ import annotations
+
+import platform
+import subprocess
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Literal
+
+from drivers.interface.geometry import SE2
+
+SCHEMA_VERSION = 1  # of the replay columns; raised when a reader of the old ones would misread the new
+_LIBRARIES = ("mujoco", "numba", "numpy", "opencv-python-headless", "osqp", "rerun-sdk", "scipy")
+
+
+@dataclass(frozen=True, slots=True)
+class SceneShape:
+    """An upright solid for the viewer: a box by its half extents, or a cylinder (x: its radius, z: its half height)."""
+
+    name: str
+    kind: Literal["box", "cylinder"]
+    map_from_shape: SE2
+    half_extents_m: tuple[float, float, float]
+    colour: tuple[int, int, int] = (112, 120, 132)
+    base_z_m: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class RunHeader:
+    """Everything that was fixed before the first tick."""
+
+    configuration_yaml: str  # the effective one, every default written out
+    seed: int
+    scenario: str
+    planner: str
+    robot_radius_m: float
+    robot_height_m: float = 0.3
+    static: tuple[SceneShape, ...] = ()
+    movers: tuple[SceneShape, ...] = ()  # shapes of what the truth reports as moving, matched by name
+    code_version: str = ""
+    code_modified: bool = False
+    libraries: tuple[str, ...] = ()  # "name version"
+    machine: str = ""
+
+
+def code_version() -> tuple[str, bool]:
+    """Return the version of this code and whether it was modified: by git in a checkout, else of the installed package."""
+    root = Path(__file__).resolve().parents[2]
+    if not (root / ".git").exists():
+        return metadata.version("trundle"), False
+    command = ["git", "-C", str(root), "describe", "--always", "--dirty", "--abbrev=12"]
+    try:
+        version = subprocess.run(command, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
+    except (OSError, subprocess.SubprocessError):  # no git here, or a repository that is not ours to read
+        return metadata.version("trundle"), False
+    return version.removesuffix("-dirty"), version.endswith("-dirty")
+
+
+def library_versions() -> tuple[str, ...]:
+    """Return "name version" of every library whose numbers enter a run."""
+    return tuple(f"{name} {metadata.version(name)}" for name in _LIBRARIES)
+
+
+def machine() -> str:
+    """Return processor architecture, system and Python of this machine."""
+    return f"{platform.machine()} {platform.system()} {platform.release()} python {platform.python_version()}"

@@ -1,0 +1,110 @@
+"""What the recorder's thread does with a tick: the exact columns, the drawn scene, the plots, one batch at a time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Protocol
+
+import rerun as rr
+
+from runtime.cycle import Cycle
+from runtime.log import plots, scene
+from runtime.log.columns import timelines
+from runtime.log.events import Events
+from runtime.log.exact import ExactPart
+from runtime.log.header import SCHEMA_VERSION, RunHeader
+from runtime.log.layout import layout
+from runtime.log.settings import LogSettings
+from runtime.log.sink import Sink
+
+RUN = "/run"
+
+
+class Drawn(Protocol):
+    """A part of what is drawn or plotted."""
+
+    def put(self, cycle: Cycle) -> None:
+        """Add a tick."""
+        ...
+
+    def send(self, sink: Sink) -> None:
+        """Send what was added and start a new batch."""
+        ...
+
+
+class Writer:
+    """Collects ticks and sends them as columns."""
+
+    def __init__(self, path: Path | None, settings: LogSettings, header: RunHeader, live_port: int | None) -> None:
+        """Open the sink and log what holds for the whole run.
+
+        Raises:
+            OSError: the file cannot be created.
+            ConfigurationError: the port of the live view is taken.
+        """
+        self._sink = Sink(path, live_port, layout(header))
+        self._exact = ExactPart(settings.depth)
+        self._drawn: tuple[Drawn, ...] = (
+            *scene.layers(header, settings),
+            *plots.layers(header.robot_radius_m),
+            plots.Diagnosed("/view/planner", plots.planner_diagnostics),
+            plots.Diagnosed("/view/shield", plots.shield_diagnostics),
+            Events(),
+        )
+        self._ticks: list[int] = []
+        self._starts_ns: list[int] = []
+        self._sink.log_static(RUN, _provenance(header, settings))
+        for entity, archetype in scene.static(header):
+            self._sink.log_static(entity, archetype)
+
+    @property
+    def fault(self) -> str:
+        """Why the file can no longer be written; empty while it can."""
+        return self._sink.fault
+
+    @property
+    def bytes_written(self) -> int:
+        """Size of the file so far."""
+        return self._sink.bytes_written
+
+    def put(self, cycle: Cycle, *, drawn: bool, lost_before: int) -> None:
+        """Add a tick to the batch; one that is not drawn is only recorded for replay."""
+        self._ticks.append(cycle.sensed.tick.index)
+        self._starts_ns.append(cycle.sensed.tick.start_ns)
+        self._exact.put(cycle, lost_before)
+        if drawn:
+            for part in self._drawn:
+                part.put(cycle)
+
+    def send(self) -> None:
+        """Send the batch and start a new one."""
+        index = timelines(self._ticks, self._starts_ns)
+        for entity, columns in self._exact.batches():
+            self._sink.send(entity, index, columns)
+        for part in self._drawn:
+            part.send(self._sink)
+        self._ticks.clear()
+        self._starts_ns.clear()
+
+    def flush(self, timeout_s: float) -> bool:
+        """Push what was sent out to the file; return whether that was done in time."""
+        return self._sink.flush(timeout_s)
+
+    def close(self, timeout_s: float) -> None:
+        """Finish the file."""
+        self._sink.close(timeout_s)
+
+
+def _provenance(header: RunHeader, settings: LogSettings) -> rr.AnyValues:
+    return rr.AnyValues(
+        schema_version=SCHEMA_VERSION,
+        replayable=settings.depth,
+        configuration=header.configuration_yaml,
+        seed=header.seed,
+        scenario=header.scenario,
+        planner=header.planner,
+        code_version=header.code_version,
+        code_modified=header.code_modified,
+        libraries=list(header.libraries),
+        machine=header.machine,
+    )
