@@ -20,7 +20,7 @@ from sim_drivers.world import MujocoWorld
 class RangeScannerSettings(Settings):
     """Settings of the scanner, which stands over base's origin.
 
-    The defaults are those of a Hokuyo UST-10LX (specification C-42-04077): 270 degrees, 0.06 to 10 m, 40 Hz, deviation of
+    The defaults are those of a Hokuyo UST-10LX (its specification): 270 degrees, 0.06 to 10 m, 40 Hz, deviation of
     repeated measurements below 30 mm; with half a degree between beams instead of a quarter.
     """
 
