@@ -37,12 +37,12 @@ class WheelEncoders:
     quantisation and the lag of the real thing.
     """
 
-    def __init__(self, settings: EncoderSettings, rng: np.random.Generator, wheels: int) -> None:
+    def __init__(self, settings: EncoderSettings, rng: np.random.Generator, wheels: int, start_ns: int) -> None:
         """Start at rest with every wheel at its zero; all noise is drawn from `rng`, in the order of the samples."""
         self._settings = settings
         self._rng = rng
         self._step_rad = 2.0 * math.pi / settings.counts_per_rev
-        self._next_ns = 0
+        self._next_ns = self._after(start_ns)
         self._last_ns: int | None = None
         self._sequence = 0
         self._position = np.zeros(wheels)
@@ -56,8 +56,7 @@ class WheelEncoders:
 
     def measure(self, now_ns: int, angle_rad: NDArray[np.float64]) -> None:
         """Measure the true wheel angles, shape (wheels,), and send the sample, unless it is lost."""
-        period_ns = self._settings.period_ns
-        self._next_ns = (now_ns // period_ns + 1) * period_ns
+        self._next_ns = self._after(now_ns)
         jitter = self._rng.normal(0.0, self._settings.jitter_counts, len(angle_rad))
         position = np.floor(angle_rad / self._step_rad + jitter) * self._step_rad
         self._velocity = self._filtered_rate(now_ns, position)
@@ -68,6 +67,10 @@ class WheelEncoders:
             return
         stamp = Stamp(now_ns, now_ns + self.delivery.latency_ns, self._sequence)
         self.delivery.send(now_ns, WheelSample(stamp, frozen_array(position.copy()), frozen_array(self._velocity.copy())))
+
+    def _after(self, now_ns: int) -> int:
+        period_ns = self._settings.period_ns
+        return (now_ns // period_ns + 1) * period_ns
 
     def _filtered_rate(self, now_ns: int, position: NDArray[np.float64]) -> NDArray[np.float64]:
         last_ns, self._last_ns = self._last_ns, now_ns

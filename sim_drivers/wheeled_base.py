@@ -69,9 +69,9 @@ class WheeledBase:
         self.max_step_s = chassis.max_step_s
         self.period_ns = chassis.period_ns
         self._drive = Drive(settings)
-        self._reset()
         self._state = DeviceState.CLOSED
         self._world = require_world(setup)
+        self._reset()
         self._world.add(self)
 
     @property
@@ -146,7 +146,7 @@ class WheeledBase:
 
     def _reset(self) -> None:
         rng = stream(self._setup.seed, f"{self._setup.name}.encoders")
-        self._encoders = WheelEncoders(self._settings.encoders, rng, self._kinematics.wheel_count)
+        self._encoders = WheelEncoders(self._settings.encoders, rng, self._kinematics.wheel_count, self._world.now_ns)
         self._drive.expired = 0
 
 

@@ -1,0 +1,194 @@
+"""A simulated seven-joint arm with Franka's published kinematics, limits and identified inertias."""
+
+from __future__ import annotations
+
+import math
+from importlib import resources
+from typing import Any, ClassVar
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from drivers.interface.commands import JointTrajectory
+from drivers.interface.devices import DeviceHealth, DeviceSetup, DeviceState
+from drivers.interface.errors import DeviceError
+from drivers.interface.samples import JointSample, Stamp, frozen_array
+from drivers.interface.seeds import stream
+from drivers.interface.settings import Settings
+from sim_drivers.arm_motion import JOINTS, PANDA, TrajectoryFollower, fault_of
+from sim_drivers.delivery import Delivery
+from sim_drivers.world import FLOOR_BIT, OBSTACLE_BIT, SECOND_NS, MujocoWorld, require_world
+
+Joints = tuple[float, float, float, float, float, float, float]
+
+READY_RAD: Joints = (0.0, -math.pi / 4, 0.0, -3 * math.pi / 4, 0.0, math.pi / 2, math.pi / 4)  # Franka's "ready" pose
+STIFFNESS_NM_RAD = np.array([3000.0, 3000.0, 3000.0, 2500.0, 2500.0, 2000.0, 2000.0])  # libfranka's own examples' impedance
+DAMPING_NM_S_RAD = np.array([140.0, 140.0, 120.0, 110.0, 55.0, 45.0, 42.0])  # near critical with the rotors' inertia
+# Inertia of the rotors seen through the gears, as Franka gave it to the authors of Drake's model (of the FR3, same drives).
+ROTOR_INERTIA_KG_M2 = (0.6057, 0.6057, 0.4625, 0.4625, 0.2055, 0.2055, 0.2055)
+
+
+class ArmSettings(Settings):
+    """Mount, start and measurement of the arm.  Franka streams at 1 kHz; the loop is given every tenth sample."""
+
+    mount_x_m: float = Field(default=0.0, ge=-2.0, le=2.0, description="of link0 in base")
+    mount_y_m: float = Field(default=0.0, ge=-2.0, le=2.0, description="of link0 in base")
+    mount_z_m: float = Field(default=0.0, ge=0.0, le=3.0, description="of link0 in base")
+    mount_yaw_rad: float = Field(default=0.0, ge=-math.pi, le=math.pi, description="of link0 in base")
+    start_rad: Joints = Field(default=READY_RAD, description="joint positions at the start of the world")
+    rate_hz: float = Field(default=100.0, gt=0.0, le=1000.0, description="joint samples per second")
+    position_resolution_rad: float = Field(default=1e-5, gt=0.0, le=0.01, description="step of the joint encoders")
+    velocity_noise_rad_s: float = Field(default=0.002, ge=0.0, le=1.0, description="standard deviation")
+    torque_noise_nm: float = Field(default=0.05, ge=0.0, le=10.0, description="standard deviation of the torque sensors")
+    latency_s: float = Field(default=0.001, ge=0.0, le=1.0, description="from measuring to our side")
+    command_latency_s: float = Field(default=0.001, ge=0.0, le=1.0, description="from command() to the first set point")
+    dropout_probability: float = Field(default=0.0005, ge=0.0, le=1.0, description="chance that a sample is lost on the way")
+    capacity: int = Field(default=256, ge=1, le=100_000, description="samples that wait at most to be drained")
+
+
+class SimArm:
+    """Position servos with gravity compensation, fed at 1 kHz by a `TrajectoryFollower`."""
+
+    Settings: ClassVar[type[Settings]] = ArmSettings
+    max_step_s = 0.001
+    period_ns = 1_000_000
+
+    def __init__(self, settings: ArmSettings, setup: DeviceSetup) -> None:
+        """Join the world.
+
+        Raises:
+            ConfigurationError: there is no simulated world.
+        """
+        self._settings = settings
+        self._setup = setup
+        self._state = DeviceState.CLOSED
+        self._follower = TrajectoryFollower(PANDA, np.array(settings.start_rad))
+        self._command_latency_ns = round(settings.command_latency_s * SECOND_NS)
+        self._pending: list[tuple[int, JointTrajectory, int]] = []  # applies_ns, trajectory, expires_ns
+        self._sample_period_ns = round(SECOND_NS / settings.rate_hz)
+        self._qpos = self._dof = self._ctrl = slice(0, 0)
+        self._world = require_world(setup)
+        self._reset()
+        self._world.add(self)
+
+    def open(self) -> None:
+        """Start delivering; counters and noise begin anew."""
+        if self._state is not DeviceState.OPEN:
+            self._reset()
+            self._state = DeviceState.OPEN
+
+    def command(self, trajectory: JointTrajectory, expires_ns: int) -> None:
+        """Follow the trajectory until `expires_ns`, then decelerate to rest.
+
+        Raises:
+            DeviceError: it cannot be followed (not finite, out of range, too fast, wrong shape), or the arm is not open.
+        """
+        if fault := fault_of(trajectory, PANDA):
+            raise DeviceError(f"{self._setup.name}: the trajectory {fault}")
+        if self._state is not DeviceState.OPEN:
+            raise DeviceError(f"{self._setup.name} is not open and takes no commands")
+        self._pending.append((self._world.now_ns + self._command_latency_ns, trajectory, expires_ns))
+
+    def drain(self) -> tuple[JointSample, ...]:
+        """Return the joint samples that have arrived since the last call, oldest first."""
+        return self._delivery.drain(self._world.now_ns) if self._state is DeviceState.OPEN else ()
+
+    def stop(self) -> None:
+        """Decelerate to rest."""
+        self._pending.clear()
+        self._follower.stop()
+
+    def close(self) -> None:
+        """Decelerate to rest and deliver nothing more."""
+        self.stop()
+        self._state = DeviceState.CLOSED
+
+    def health(self) -> DeviceHealth:
+        """Say how it stands."""
+        return DeviceHealth(
+            device=self._setup.name,
+            state=self._state,
+            received=self._delivery.arrived,
+            dropped=self._dropped,
+            overflowed=self._delivery.overflowed,
+            expired_commands=self._follower.expired,
+            expected_period_ns=self._sample_period_ns,
+        )
+
+    def build(self, spec: Any, base: Any) -> None:
+        """Attach the model in `configs/models/panda.urdf` to the base, with a servo for each joint."""
+        s = self._settings
+        arm = mujoco.MjSpec.from_string(resources.files("configs").joinpath("models/panda.urdf").read_text(encoding="utf-8"))
+        arm.compiler.fusestatic = False  # keep the flange
+        for body in arm.bodies:
+            body.gravcomp = 1.0
+        for geom in arm.geoms:
+            geom.contype, geom.conaffinity = 0, FLOOR_BIT | OBSTACLE_BIT
+        for joint, rotor in zip(arm.joints, ROTOR_INERTIA_KG_M2, strict=True):
+            joint.armature = rotor
+        half_yaw = s.mount_yaw_rad / 2
+        mount = base.add_frame(pos=[s.mount_x_m, s.mount_y_m, s.mount_z_m], quat=[math.cos(half_yaw), 0, 0, math.sin(half_yaw)])
+        spec.attach(arm, frame=mount, prefix=f"{self._setup.name}_")
+        for index in range(JOINTS):
+            _add_position_servo(spec, self._joint(index), index)
+
+    def bind(self, world: MujocoWorld) -> None:
+        """Look up the joints and put them where they start."""
+        model, data = world.model, world.data
+        joint = model.joint(self._joint(0))
+        first, dof = int(joint.qposadr[0]), int(joint.dofadr[0])
+        servo = int(model.actuator(self._joint(0)).id)
+        self._qpos, self._dof, self._ctrl = (slice(start, start + JOINTS) for start in (first, dof, servo))
+        data.qpos[self._qpos] = self._settings.start_rad
+        mujoco.mj_step1(model, data)
+
+    def act(self, world: MujocoWorld) -> None:
+        """Move the set point on, and measure when it is time."""
+        while self._pending and self._pending[0][0] <= world.now_ns:
+            applies_ns, trajectory, expires_ns = self._pending.pop(0)
+            self._follower.follow(trajectory, expires_ns, applies_ns)
+        self._follower.step(world.now_ns)
+        # The servo damps the joint's own velocity, so the set point leads by what damping would hold it back.
+        lead = DAMPING_NM_S_RAD / STIFFNESS_NM_RAD * self._follower.velocity_rad_s
+        world.data.ctrl[self._ctrl] = self._follower.position_rad + lead
+        if self._state is DeviceState.OPEN and world.now_ns >= self._next_ns:
+            self._measure(world)
+
+    def _measure(self, world: MujocoWorld) -> None:
+        s, data, now_ns = self._settings, world.data, world.now_ns
+        self._next_ns = self._after(now_ns)
+        step = s.position_resolution_rad
+        position: NDArray[np.float64] = np.round(data.qpos[self._qpos] / step) * step
+        velocity = data.qvel[self._dof] + self._rng.normal(0.0, s.velocity_noise_rad_s, JOINTS)
+        load = data.qfrc_actuator[self._dof] + data.qfrc_gravcomp[self._dof]
+        torque = load + self._rng.normal(0.0, s.torque_noise_nm, JOINTS)
+        self._sequence += 1
+        if self._rng.random() < s.dropout_probability:
+            self._dropped += 1
+            return
+        stamp = Stamp(now_ns, now_ns + self._delivery.latency_ns, self._sequence)
+        self._delivery.send(now_ns, JointSample(stamp, frozen_array(position), frozen_array(velocity), frozen_array(torque)))
+
+    def _after(self, now_ns: int) -> int:
+        return (now_ns // self._sample_period_ns + 1) * self._sample_period_ns
+
+    def _joint(self, index: int) -> str:
+        return f"{self._setup.name}_panda_joint{index + 1}"
+
+    def _reset(self) -> None:
+        self._rng = stream(self._setup.seed, f"{self._setup.name}.joints")
+        self._delivery: Delivery[JointSample] = Delivery(round(self._settings.latency_s * SECOND_NS), self._settings.capacity)
+        self._sequence = self._dropped = self._follower.expired = 0
+        self._next_ns = self._after(self._world.now_ns)
+
+
+def _add_position_servo(spec: Any, joint: str, index: int) -> None:
+    servo = spec.add_actuator(name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    stiffness, damping, limit = STIFFNESS_NM_RAD[index], DAMPING_NM_S_RAD[index], PANDA.torque_nm[index]
+    servo.gainprm[0] = stiffness
+    servo.biastype = mujoco.mjtBias.mjBIAS_AFFINE
+    servo.biasprm[1:3] = -stiffness, -damping
+    servo.forcelimited = True
+    servo.forcerange = [-limit, limit]

@@ -1,0 +1,126 @@
+"""The arm's own 1 kHz process: from a joint trajectory to set points that keep every limit, and to rest when it expires."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
+
+from drivers.interface.commands import JointTrajectory
+
+F64 = NDArray[np.float64]
+
+JOINTS = 7
+POSITION_GAIN_1_S = 25.0
+VELOCITY_GAIN_1_S = 100.0
+BRAKE_SHARE = 0.8  # of the acceleration that closing a gap counts on; the rest is for the gains
+
+
+def _row(*values: float) -> F64:
+    return np.array(values)
+
+
+@dataclass(frozen=True, slots=True)
+class JointLimits:
+    """What each joint may do, every field of shape (7,)."""
+
+    position_min_rad: F64
+    position_max_rad: F64
+    velocity_rad_s: F64
+    acceleration_rad_s2: F64
+    jerk_rad_s3: F64
+    torque_nm: F64
+
+
+# Franka Control Interface documentation, robot limits of the Panda.
+PANDA = JointLimits(
+    position_min_rad=_row(-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973),
+    position_max_rad=_row(2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973),
+    velocity_rad_s=_row(2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61),
+    acceleration_rad_s2=_row(15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0),
+    jerk_rad_s3=_row(7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0),
+    torque_nm=_row(87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0),
+)
+
+
+def fault_of(trajectory: JointTrajectory, limits: JointLimits) -> str:
+    """Return what is wrong with a trajectory as the end of a sentence, or nothing when it can be followed."""
+    time_s, position, velocity = trajectory.time_from_start_s, trajectory.position_rad, trajectory.velocity_rad_s
+    shape = (len(time_s), JOINTS)
+    if len(time_s) < 2 or position.shape != shape or velocity.shape != shape:
+        return f"needs at least two knots of {JOINTS} positions and velocities; got {position.shape} and {velocity.shape}"
+    if not (np.isfinite(time_s).all() and np.isfinite(position).all() and np.isfinite(velocity).all()):
+        return "is not finite"
+    if time_s[0] < 0.0 or (np.diff(time_s) <= 0.0).any():
+        return "has knot times that do not increase"
+    if (position < limits.position_min_rad).any() or (position > limits.position_max_rad).any():
+        return "leaves the joints' range"
+    if (np.abs(velocity) > limits.velocity_rad_s).any():
+        return "is faster than the joints' velocity limits"
+    return ""
+
+
+class TrajectoryFollower:
+    """Moves a set point of all joints along a trajectory, inside velocity, acceleration and jerk limits.
+
+    Between knots the trajectory is a cubic Hermite spline.  A gap between set point and trajectory (a late start, a
+    trajectory that asks too much) is closed no faster than the limits allow.
+    """
+
+    def __init__(self, limits: JointLimits, position_rad: F64) -> None:
+        """Rest at `position_rad`, shape (7,)."""
+        self._limits = limits
+        self.position_rad = position_rad.copy()  # (7,)
+        self.velocity_rad_s = np.zeros_like(position_rad)  # (7,)
+        self._acceleration = np.zeros_like(position_rad)  # (7,)
+        self._spline: CubicHermiteSpline | None = None
+        self._start_ns = self._expires_ns = self._last_ns = 0
+        self.expired = 0  # times the dead man had to act
+
+    def follow(self, trajectory: JointTrajectory, expires_ns: int, now_ns: int) -> None:
+        """Follow a trajectory whose clock starts now, until `expires_ns`."""
+        self._spline = CubicHermiteSpline(trajectory.time_from_start_s, trajectory.position_rad, trajectory.velocity_rad_s)
+        self._start_ns, self._expires_ns = now_ns, expires_ns
+
+    def stop(self) -> None:
+        """Forget the trajectory and decelerate to rest."""
+        self._spline = None
+
+    def step(self, now_ns: int) -> None:
+        """Move the set point on to `now_ns`."""
+        dt_s, self._last_ns = (now_ns - self._last_ns) * 1e-9, now_ns
+        if dt_s <= 0.0:
+            return
+        velocity, acceleration = self._wanted(now_ns)
+        limits, cap = self._limits, self._limits.acceleration_rad_s2
+        slowest = -self._safe_speed(self.position_rad - limits.position_min_rad)
+        fastest = self._safe_speed(limits.position_max_rad - self.position_rad)
+        asked = acceleration + VELOCITY_GAIN_1_S * (np.clip(velocity, slowest, fastest) - self.velocity_rad_s)
+        jerk = limits.jerk_rad_s3 * dt_s
+        asked = np.clip(np.clip(asked, -cap, cap), self._acceleration - jerk, self._acceleration + jerk)
+        self._acceleration = asked
+        self.velocity_rad_s = self.velocity_rad_s + asked * dt_s
+        self.position_rad = self.position_rad + self.velocity_rad_s * dt_s
+
+    def _wanted(self, now_ns: int) -> tuple[F64, F64]:
+        """Return velocity and acceleration to aim at, both (7,); zero without a valid trajectory."""
+        rest = np.zeros_like(self.position_rad)
+        if self._spline is None:
+            return rest, rest
+        elapsed_s, first_s, last_s = (now_ns - self._start_ns) * 1e-9, float(self._spline.x[0]), float(self._spline.x[-1])
+        if now_ns >= self._expires_ns:
+            self.expired += int(elapsed_s < last_s)  # one that was followed to its end is simply over
+            self._spline = None
+            return rest, rest
+        gap = self._spline(min(max(elapsed_s, first_s), last_s)) - self.position_rad
+        closing = np.minimum(POSITION_GAIN_1_S * np.abs(gap), self._safe_speed(np.abs(gap))) * np.sign(gap)
+        if not first_s <= elapsed_s < last_s:
+            return closing, rest
+        return self._spline(elapsed_s, 1) + closing, self._spline(elapsed_s, 2)
+
+    def _safe_speed(self, distance_rad: F64) -> F64:
+        """Return the speed within the limits from which each joint still stops in its distance, both (7,)."""
+        braking = np.sqrt(2.0 * BRAKE_SHARE * self._limits.acceleration_rad_s2 * np.maximum(distance_rad, 0.0))
+        return np.asarray(np.minimum(self._limits.velocity_rad_s, braking), dtype=np.float64)
