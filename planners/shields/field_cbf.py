@@ -5,12 +5,10 @@ Source: Cui, Deng, Wang, section 4.3, equations 5 to 8, appendix B.  README.md b
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from drivers.interface.commands import BodyTwist, Command
@@ -18,10 +16,7 @@ from drivers.interface.settings import Settings
 from estimators.belief import Belief
 from planners.planner import Diagnostics
 from planners.shield import Filtered, ReachableSet, ShieldSetup
-from planners.shields.field_cbf_kernels import boundary_samples, constraints
-from planners.shields.plane_qp import solve
-
-F64 = NDArray[np.float64]
+from planners.shields.field_cbf_kernels import Barrier, filter_velocity
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,16 +58,25 @@ class FieldCbf:
 
     def __init__(self, settings: Settings, setup: ShieldSetup) -> None:
         """Take the settings."""
-        self._settings = settings
-        self._safe_m = setup.robot_radius_m + settings.d_min_m
-        self._reaction_s = max(settings.reaction_time_s, setup.period_s)
+        s = settings
+        self._stop_when_infeasible = s.on_infeasible == "stop"
+        self._barrier = Barrier(
+            safe_m=setup.robot_radius_m + s.d_min_m,
+            directions=s.directions,
+            sample_radius_m=s.sample_radius_m,
+            alpha_per_s=s.alpha_per_s,
+            guard_m=s.guard_m,
+            contact_time_s=s.contact_time_s,
+            reaction_s=max(s.reaction_time_s, setup.period_s),
+            buffer_gain=s.buffer_gain,
+            buffer_min_m=s.buffer_min_m,
+            buffer_max_m=s.buffer_max_m,
+        )
 
     def warm_up(self) -> None:
         """Compile the kernels, on an empty field."""
-        field, none = np.zeros((3, 3), np.float32), np.zeros((3, 3), np.bool_)
-        normal, distance, rate = boundary_samples(field, field, none, np.zeros(2), 1.0, np.zeros(2), 1.0, 1.0, 4)
-        half_planes = constraints(normal, distance, rate, np.zeros(2), 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0)
-        solve(*half_planes, np.zeros(2), np.zeros(2), np.ones(2))
+        field, none, zero = np.zeros((3, 3), np.float32), np.zeros((3, 3), np.bool_), np.zeros(2)
+        filter_velocity(field, field, none, zero, 1.0, np.zeros(3), zero, zero, zero, self._barrier)
 
     def filter(self, command: Command, belief: Belief, reachable: ReachableSet) -> Filtered:
         """Return the command with its twist filtered; wz is only clipped, as turning moves no boundary of a round robot.
@@ -82,7 +86,7 @@ class FieldCbf:
         if command.base is None:
             return Filtered(command)
         asked = command.base if command.base.finite else BodyTwist()
-        (vx, vy), diagnostics = self._velocity(asked, belief, reachable)
+        vx, vy, diagnostics = self._velocity(asked, belief, reachable)
         twist = reachable.clip(BodyTwist(vx, vy, asked.wz))
         return Filtered(replace(command, base=twist), intervened=twist != command.base, diagnostics=diagnostics)
 
@@ -93,37 +97,17 @@ class FieldCbf:
     def restore(self, snapshot: bytes) -> None:
         """Nothing to take over."""
 
-    def _velocity(self, asked: BodyTwist, belief: Belief, reachable: ReachableSet) -> tuple[tuple[float, float], Diagnostics]:
-        """Return the filtered (vx, vy) in the body frame."""
-        normals, distance, rate = self._boundaries(belief)
-        h = distance - self._safe_m
-        samples = int(np.isfinite(distance).sum())
-        lattice, pose = belief.clearance.lattice, belief.odom_from_base
-        (row,), (column,) = lattice.cell_of(np.array([[pose.x, pose.y]]))
-        inside = 0 <= row < lattice.rows and 0 <= column < lattice.columns
-        if inside and belief.clearance.clearance_m[row, column] <= 0.0:
-            return (0.0, 0.0), FieldCbfDiagnostics(samples, 0, -self._safe_m, True, 0.0, True)
-        wanted = np.array([asked.vx, asked.vy])
-        s = self._settings
-        planes, bounds = constraints(
-            normals, distance, rate, wanted, self._safe_m, s.alpha_per_s, s.guard_m, s.contact_time_s,
-            self._reaction_s, s.buffer_gain, s.buffer_min_m, s.buffer_max_m,
-        )  # fmt: skip
-        low, high = reachable.lowest, reachable.highest
-        u, slack = solve(planes, bounds, wanted, np.array([low.vx, low.vy]), np.array([high.vx, high.vy]))
-        if slack > 0.0 and s.on_infeasible == "stop":
-            u = np.zeros(2)
-        least = float(h.min()) if samples else math.inf
-        diagnostics = FieldCbfDiagnostics(samples, len(bounds), least, slack > 0.0, float(slack), False)
-        return (float(u[0]), float(u[1])), diagnostics
-
-    def _boundaries(self, belief: Belief) -> tuple[F64, F64, F64]:
-        """Return normals in the body frame, shape (K, 2), distances [m] and rates [m/s], shape (K,)."""
-        field, pose, s = belief.clearance, belief.odom_from_base, self._settings
+    def _velocity(self, asked: BodyTwist, belief: Belief, reachable: ReachableSet) -> tuple[float, float, Diagnostics]:
+        """Return the filtered vx, vy in the body frame."""
+        field, pose, low, high = belief.clearance, belief.odom_from_base, reachable.lowest, reachable.highest
         lattice = field.lattice
-        normals, distance, rate = boundary_samples(
+        vx, vy, samples, active, nearest_m, slack, enclosed = filter_velocity(
             field.clearance_m, field.rate_m_s, field.overlap, np.array([lattice.x_m, lattice.y_m]), lattice.cell_m,
-            np.array([pose.x, pose.y]), s.sample_radius_m, 2.0 * self._safe_m, s.directions,
+            np.array([pose.x, pose.y, pose.yaw]), np.array([asked.vx, asked.vy]),
+            np.array([low.vx, low.vy]), np.array([high.vx, high.vy]), self._barrier,
         )  # fmt: skip
-        c, sn = math.cos(pose.yaw), math.sin(pose.yaw)
-        return normals @ np.array([[c, -sn], [sn, c]]), distance, rate
+        infeasible = enclosed or slack > 0.0
+        if infeasible and self._stop_when_infeasible:
+            vx, vy = 0.0, 0.0
+        least_h_m = nearest_m - self._barrier.safe_m
+        return vx, vy, FieldCbfDiagnostics(samples, active, least_h_m, infeasible, slack, enclosed)

@@ -2,15 +2,34 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+
+from planners.shields.plane_qp import solve
 
 F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 MIN_SLOPE = 0.5  # a distance field rises by 1 per metre; where much less is left, two boundaries cancel (medial axis)
+
+
+class Barrier(NamedTuple):
+    """How much room is kept, and when; the shield's settings in the paper's units."""
+
+    safe_m: float  # clearance at which the barrier is zero
+    directions: int
+    sample_radius_m: float
+    alpha_per_s: float
+    guard_m: float  # boundaries this near always constrain
+    contact_time_s: float  # farther ones when contact is nearer than this
+    reaction_s: float  # for how long a boundary closes in unanswered
+    buffer_gain: float
+    buffer_min_m: float
+    buffer_max_m: float
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -35,12 +54,12 @@ def boundary_of(field: F32, row: int, column: int, cell_m: float, x: float, y: f
         return 0.0, 0.0, np.inf, 0.0
     slope_x = (field[row, column + 1] - field[row, column - 1]) / (2.0 * cell_m)
     slope_y = (field[row + 1, column] - field[row - 1, column]) / (2.0 * cell_m)
-    slope = np.hypot(slope_x, slope_y)
+    slope = np.sqrt(slope_x * slope_x + slope_y * slope_y)
     if slope < MIN_SLOPE:
         return 0.0, 0.0, np.inf, slope
     away_x = x + field[row, column] * slope_x / slope
     away_y = y + field[row, column] * slope_y / slope
-    distance = np.hypot(away_x, away_y)
+    distance = np.sqrt(away_x * away_x + away_y * away_y)
     if away_x * slope_x + away_y * slope_y <= 0.0 or distance < 1e-9:
         return 0.0, 0.0, np.inf, slope
     return away_x, away_y, distance, slope
@@ -49,7 +68,7 @@ def boundary_of(field: F32, row: int, column: int, cell_m: float, x: float, y: f
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def boundary_samples(
     field: F32, rate: F32, overlap: Mask, corner: F64, cell_m: float, robot: F64, radius_m: float, reach_m: float, bins: int
-) -> tuple[F64, F64, F64]:
+) -> tuple[F64, F64, F64, bool]:
     """Return the nearest boundary point in each of `bins` directions.
 
     Source: Cui, Deng, Wang, section 4.3, equation 5 and the text before it.  The clearance and its slope vanish inside an
@@ -70,11 +89,12 @@ def boundary_samples(
 
     Returns:
         Unit normals from boundary to robot in odom, shape (bins, 2); distances [m], shape (bins,), infinite where a
-        direction has none; rates at which the boundaries recede [m/s], shape (bins,), negative when they close in.
+        direction has none; rates at which the boundaries recede [m/s], shape (bins,), negative when they close in; and
+        whether the robot's own cell is occupied.
     """
     rows, columns = field.shape
     normal, distance = np.zeros((bins, 2)), np.full(bins, np.inf)
-    centre_row, centre_column = int((robot[1] - corner[1]) / cell_m), int((robot[0] - corner[0]) / cell_m)
+    centre_row, centre_column = int(np.floor((robot[1] - corner[1]) / cell_m)), int(np.floor((robot[0] - corner[0]) / cell_m))
     span = int(np.ceil(radius_m / cell_m)) + 1
     found, side = 0, (2 * span + 1) ** 2
     bin_of, distance_of, rate_of = np.empty(side, np.int64), np.empty(side), np.empty(side)
@@ -101,31 +121,23 @@ def boundary_samples(
         if distance_of[i] <= distance[k] + cell_m:
             total[k] += rate_of[i]
             count[k] += 1.0
-    return normal, distance, total / np.maximum(count, 1.0)
+    inside = 0 <= centre_row < rows and 0 <= centre_column < columns
+    enclosed = inside and field[centre_row, centre_column] <= 0.0
+    return normal, distance, total / np.maximum(count, 1.0), enclosed
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def constraints(
-    normal: F64, distance: F64, rate: F64, nominal: F64, safe_m: float, alpha: float, guard_m: float, contact_time_s: float,
-    reaction_s: float, buffer_gain: float, buffer_min_m: float, buffer_max_m: float,
-) -> tuple[F64, F64]:  # fmt: skip
+def constraints(normal: F64, distance: F64, rate: F64, asked: F64, barrier: Barrier) -> tuple[F64, F64]:
     """Return the half-planes normal . u >= bound that are committed to the QP, shapes (m, 2) and (m,) [m/s].
 
-    Source: Cui, Deng, Wang, equations 6 (constraint), 7 (gate) and 8 (buffer); `rate` is positive when a boundary recedes.
+    Source: Cui, Deng, Wang, equations 6 (constraint), 7 (gate) and 8 (buffer).
 
     Args:
         normal: from boundary to robot, shape (n, 2).
         distance: to the boundary [m], shape (n,); infinite ones are left out.
         rate: at which the boundary recedes [m/s], shape (n,).
-        nominal: velocity that was asked, shape (2,), in the frame of the normals [m/s].
-        safe_m: clearance at which the barrier is zero.
-        alpha: gain of the barrier [1/s].
-        guard_m: constraints this near are always committed.
-        contact_time_s: farther ones are committed when contact is nearer than this.
-        reaction_s: for how long a boundary closes in unanswered.
-        buffer_gain: beta of equation 8.
-        buffer_min_m: least buffer.
-        buffer_max_m: largest buffer.
+        asked: velocity, shape (2,), in the frame of the normals [m/s].
+        barrier: how much room is kept, and when.
     """
     kept = np.empty(len(distance), np.int64)
     bound = np.empty(len(distance))
@@ -133,11 +145,51 @@ def constraints(
     for i in range(len(distance)):
         if not np.isfinite(distance[i]):
             continue
-        h = distance[i] - safe_m
-        closing = -(rate[i] + normal[i, 0] * nominal[0] + normal[i, 1] * nominal[1])
-        if distance[i] > guard_m and h >= contact_time_s * max(0.0, closing):
+        h = distance[i] - barrier.safe_m
+        closing = -(rate[i] + normal[i, 0] * asked[0] + normal[i, 1] * asked[1])
+        if distance[i] > barrier.guard_m and h >= barrier.contact_time_s * max(0.0, closing):
             continue
-        buffer = min(max(buffer_gain * max(0.0, -rate[i]) * reaction_s, buffer_min_m), buffer_max_m)
-        kept[count], bound[count] = i, -rate[i] - alpha * (h - buffer)
+        wanted = barrier.buffer_gain * max(0.0, -rate[i]) * barrier.reaction_s
+        buffer = min(max(wanted, barrier.buffer_min_m), barrier.buffer_max_m)
+        kept[count], bound[count] = i, -rate[i] - barrier.alpha_per_s * (h - buffer)
         count += 1
     return normal[kept[:count]], bound[:count]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def filter_velocity(
+    field: F32, rate: F32, overlap: Mask, corner: F64, cell_m: float, pose: F64, asked: F64, low: F64, high: F64,
+    barrier: Barrier,
+) -> tuple[float, float, int, int, float, float, bool]:  # fmt: skip
+    """Sample, constrain and solve.
+
+    Args:
+        field: clearance [m], shape (rows, columns).
+        rate: its rate [m/s], shape (rows, columns).
+        overlap: where the rate is known, shape (rows, columns).
+        corner: lower corner of the lattice in odom, shape (2,).
+        cell_m: size of a cell.
+        pose: x, y, yaw in odom, shape (3,).
+        asked: vx, vy in the body frame, shape (2,).
+        low: least vx, vy that can be reached, shape (2,).
+        high: largest vx, vy that can be reached, shape (2,).
+        barrier: how much room is kept, and when.
+
+    Returns:
+        vx, vy, number of samples, number of constraints, least distance [m] (infinite without samples), slack of the QP
+        [m/s], and whether the robot's own cell is occupied; then the velocity is zero.
+    """
+    reach_m = 2.0 * barrier.safe_m
+    normal, distance, recede, enclosed = boundary_samples(
+        field, rate, overlap, corner, cell_m, pose[:2], barrier.sample_radius_m, reach_m, barrier.directions
+    )
+    samples = 0
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    for i in range(len(distance)):
+        samples += np.isfinite(distance[i])
+        normal[i, 0], normal[i, 1] = c * normal[i, 0] + s * normal[i, 1], c * normal[i, 1] - s * normal[i, 0]
+    if enclosed:
+        return 0.0, 0.0, samples, 0, 0.0, 0.0, True
+    normals, bounds = constraints(normal, distance, recede, asked, barrier)
+    u, slack = solve(normals, bounds, asked, low, high)
+    return u[0], u[1], samples, len(bounds), distance.min(), slack, False

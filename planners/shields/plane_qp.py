@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 F64 = NDArray[np.float64]
 
+SLACK_RESOLUTION = 1e-6  # m/s
+
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def cut(polygon: F64, normal: F64, bound: float) -> F64:
@@ -20,16 +22,19 @@ def cut(polygon: F64, normal: F64, bound: float) -> F64:
     n = len(polygon)
     kept = np.empty((2 * n + 2, 2))
     count = 0
-    for i in range(n):
-        here, after = polygon[i], polygon[(i + 1) % n]
-        over_here = normal[0] * here[0] + normal[1] * here[1] - bound
-        over_after = normal[0] * after[0] + normal[1] * after[1] - bound
-        if over_here >= 0.0:
-            kept[count] = here
+    x, y = polygon[n - 1, 0], polygon[n - 1, 1]
+    over = normal[0] * x + normal[1] * y - bound
+    for i in range(n):  # the edge from (x, y) to corner i
+        after_x, after_y = polygon[i, 0], polygon[i, 1]
+        over_after = normal[0] * after_x + normal[1] * after_y - bound
+        if over * over_after < 0.0:
+            part = over / (over - over_after)
+            kept[count, 0], kept[count, 1] = x + (after_x - x) * part, y + (after_y - y) * part
             count += 1
-        if over_here * over_after < 0.0:
-            kept[count] = here + (after - here) * (over_here / (over_here - over_after))
+        if over_after >= 0.0:
+            kept[count, 0], kept[count, 1] = after_x, after_y
             count += 1
+        x, y, over = after_x, after_y, over_after
     return kept[:count]
 
 
@@ -77,7 +82,7 @@ def solve(normals: F64, bounds: F64, asked: F64, low: F64, high: F64) -> tuple[F
     """Minimise |u - asked|^2 subject to low <= u <= high and normals . u >= bounds.
 
     Where no u satisfies all, the half-planes are relaxed by one common slack, the smallest for which the box still holds a
-    point (found by bisection to 1e-9 m/s), so that the largest violation is least; the box is never left.
+    point (found by bisection to SLACK_RESOLUTION), so that the largest violation is least; the box is never left.
 
     Args:
         normals: unit normals of the half-planes, shape (m, 2).
@@ -97,7 +102,7 @@ def solve(normals: F64, bounds: F64, asked: F64, low: F64, high: F64) -> tuple[F
         return np.minimum(np.maximum(nearest_in_polygon(polygon, asked), low), high), 0.0
     too_little, enough = 0.0, worst_violation(normals, bounds, clipped)
     polygon = clipped.reshape(1, 2)  # what is known to be feasible with the slack `enough`
-    while enough - too_little > 1e-9 * max(1.0, enough):
+    while enough - too_little > SLACK_RESOLUTION:
         middle = 0.5 * (too_little + enough)
         relaxed = feasible_polygon(normals, bounds, middle, low, high)
         if len(relaxed) > 0:

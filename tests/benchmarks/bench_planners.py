@@ -1,4 +1,4 @@
-"""One call of each planner, shield and router, in a walled corridor with pillars, the robot near two of them."""
+"""One call of each planner, shield and router, in a walled corridor with two pillars, the robot near one of them, which moves towards it."""
 
 from collections.abc import Callable
 
@@ -14,7 +14,7 @@ from planners.shields.field_cbf import FieldCbf
 from tests.planners.synthetic import OMNI, Box, Disc, belief_of, command_of, mission_to, reachable_from
 
 PERIOD_S, RADIUS_M = 0.05, 0.12
-CORRIDOR = (Box(-1, -1.1, 9, -1.0), Box(-1, 1.0, 9, 1.1), Disc(3, 0.3, 0.25, -0.5), Disc(2.7, -0.4, 0.25), Disc(4.5, 0.1, 0.25))
+CORRIDOR = (Box(-1, -1.1, 9, -1.0), Box(-1, 1.0, 9, 1.1), Disc(3, 0.3, 0.25, -0.5), Disc(4.5, -0.5, 0.25))
 
 
 def cases() -> list[tuple[str, Callable[[], object]]]:

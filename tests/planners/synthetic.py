@@ -81,9 +81,10 @@ def belief_of(
     size_m=6.0,
     cell_m=0.05,
     seen_m=None,
+    fov_rad=None,
     map_from_odom=ORIGIN,
 ):
-    """Draw the obstacles around the robot; `seen_m`: cells farther away than this are unknown."""
+    """Draw the obstacles around the robot; `seen_m`: cells farther away are unknown; `fov_rad`: so are those outside of it."""
     count = round(size_m / cell_m)
     corner = [math.floor((v - 0.5 * size_m) / cell_m + 0.5) * cell_m for v in (pose.x, pose.y)]
     lattice = Lattice(corner[0], corner[1], cell_m, count, count)
@@ -99,6 +100,9 @@ def belief_of(
     label = np.where(clearance <= 0.0, OCCUPIED, FREE).astype(np.uint8)
     if seen_m is not None:
         label[np.hypot(x - pose.x, y - pose.y) > seen_m] = UNKNOWN
+    if fov_rad is not None:
+        bearing = np.arctan2(y - pose.y, x - pose.x) - pose.yaw
+        label[(np.abs(np.arctan2(np.sin(bearing), np.cos(bearing))) > 0.5 * fov_rad) & (label == FREE)] = UNKNOWN
     shape = (count, count)
     grid = OccupancyGrid(lattice, label.reshape(shape))
     known = grid.label != UNKNOWN
@@ -166,6 +170,7 @@ def drive(
     duration_s=20.0,
     radius_m=0.12,
     seen_m=None,
+    fov_rad=None,
     tolerance_m=0.2,
 ):
     """Run planner, router and shield in a world of pure kinematics until the goal or the end of the time."""
@@ -179,7 +184,7 @@ def drive(
         trace.clearance_m.append(gap)
         if math.hypot(pose.x - goal[0], pose.y - goal[1]) < tolerance_m and twist.speed_m_s < 0.1:
             break
-        belief = belief_of(world, pose, twist, tick=tick, seen_m=seen_m)
+        belief = belief_of(world, pose, twist, tick=tick, seen_m=seen_m, fov_rad=fov_rad)
         plan = planner.plan(belief, router.route(belief, mission))
         reachable = reachable_from(twist, limits, period_s)
         filtered = shield.filter(command_of(reachable.clip(plan.base)), belief, reachable)

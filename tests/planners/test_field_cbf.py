@@ -7,7 +7,7 @@ from drivers.interface.commands import BodyTwist
 from drivers.interface.geometry import SE2
 from planners.shield import ReachableSet, ShieldSetup
 from planners.shields.field_cbf import FieldCbf
-from planners.shields.field_cbf_kernels import boundary_samples, constraints
+from planners.shields.field_cbf_kernels import Barrier, boundary_samples, constraints
 from planners.shields.none import NoShield
 from tests.planners.synthetic import DIFFERENTIAL, OMNI, Box, Disc, belief_of, command_of, reachable_from
 
@@ -104,7 +104,7 @@ def test_gate_lets_a_distant_boundary_go_and_catches_the_one_driven_at():
 def test_one_wall_gives_its_exact_barrier_value_normal_and_rate():
     belief = belief_of([Box(0.4, -3.0, 0.8, 3.0, vx=-0.25)], SE2(0.013, 0.007))
     field, lattice = belief.clearance, belief.clearance.lattice
-    normal, distance, rate = boundary_samples(
+    normal, distance, rate, _ = boundary_samples(
         field.clearance_m, field.rate_m_s, field.overlap, np.array([lattice.x_m, lattice.y_m]), lattice.cell_m,
         np.array([0.013, 0.007]), 0.7, 0.44, 16,
     )  # fmt: skip
@@ -117,7 +117,7 @@ def test_one_wall_gives_its_exact_barrier_value_normal_and_rate():
 def test_far_side_of_a_pillar_gives_no_sample():
     belief = belief_of([Disc(0.45, 0.0, 0.1, vx=-0.5)])
     field, lattice = belief.clearance, belief.clearance.lattice
-    _, distance, rate = boundary_samples(
+    _, distance, rate, _ = boundary_samples(
         field.clearance_m, field.rate_m_s, field.overlap, np.array([lattice.x_m, lattice.y_m]), lattice.cell_m,
         np.zeros(2), 0.9, 0.44, 16,
     )  # fmt: skip
@@ -128,10 +128,11 @@ def test_far_side_of_a_pillar_gives_no_sample():
 
 
 def test_buffer_follows_equation_8_between_its_bounds():
-    normal, nominal = np.array([[-1.0, 0.0]]), np.zeros(2)
+    normal, asked = np.array([[-1.0, 0.0]]), np.zeros(2)
+    barrier = Barrier(0.22, 16, 0.7, 2.0, 0.3, 0.4, 0.2, 1.0, 0.05, 0.25)
 
     def buffer(rate):
-        _, bound = constraints(normal, np.array([0.25]), np.array([rate]), nominal, 0.22, 2.0, 0.3, 0.4, 0.2, 1.0, 0.05, 0.25)
+        _, bound = constraints(normal, np.array([0.25]), np.array([rate]), asked, barrier)
         return (bound[0] + rate) / 2.0 + 0.03
 
     assert buffer(0.5) == pytest.approx(0.05)
