@@ -213,3 +213,11 @@ def test_window_is_what_the_accelerations_reach_inside_the_caps(now, limits):
         assert values.min() >= max(-limit, start - getattr(reach, name) * 0.2) - 1e-12
         assert values.max() <= min(limit, start + getattr(reach, name) * 0.2) + 1e-12
     assert (samples == 0.0).all(axis=1).any() == (now.vx < 1.0)
+
+
+@pytest.mark.parametrize("limits", [OMNI, DIFFERENTIAL], ids=["omni", "differential"])
+@pytest.mark.parametrize("goal", [(3.0, 0.0), (-2.0, 0.5)])
+def test_it_arrives_with_what_a_camera_sees_now_and_no_memory(limits, goal):
+    trace = run([Disc(1.5, 0.05, 0.3)], goal, limits, duration_s=25.0, seen_m=2.5, fov_rad=1.5)
+    assert trace.reached(*goal)
+    assert trace.min_clearance_m > 0.08

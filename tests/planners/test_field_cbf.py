@@ -213,3 +213,11 @@ def test_no_shield_only_clips():
     assert filtered.command.base == BodyTwist(0.75, 0.1, 0.0)
     assert filtered.intervened
     assert shield.filter(command_of(None), belief_of([]), CAPS).command.base is None
+
+
+@pytest.mark.parametrize(("half_width_m", "passes"), [(0.26, False), (0.32, True)])
+def test_passage_narrower_than_twice_the_buffered_clearance_is_closed(half_width_m, passes):
+    walls = [Box(-3, half_width_m, 3, 0.6), Box(-3, -0.6, 3, -half_width_m)]
+    filtered = shield_of().filter(command_of(BodyTwist(0.4, 0.0, 0.0)), belief_of(walls), CAPS)
+    assert (filtered.command.base.vx > 0.35) == passes
+    assert filtered.diagnostics.infeasible != passes

@@ -1,0 +1,24 @@
+from pathlib import Path
+
+import pytest
+
+import planners
+from planners.dwa.planner import DynamicWindow
+from planners.point_ds.planner import PointAttractor
+from planners.routers.grid import GridRouter
+from planners.shields.field_cbf import FieldCbf
+
+
+@pytest.mark.parametrize(
+    ("folder", "part"), [("dwa", DynamicWindow), ("point_ds", PointAttractor), ("routers", GridRouter), ("shields", FieldCbf)]
+)
+def test_readme_names_every_setting_and_its_default(folder, part):
+    text = (Path(planners.__file__).parent / folder / "README.md").read_text()
+    rows = [line.split("|")[1:4] for line in text.splitlines() if line.startswith("| `")]
+    stated = {}
+    for keys, defaults, _ in rows:
+        stated |= dict(zip([k.strip(" `") for k in keys.split(",")], [d.strip() for d in defaults.split(",")], strict=True))
+    actual = {name: field.default for name, field in part.Settings.model_fields.items()}
+    assert stated.keys() == actual.keys()
+    for name, default in actual.items():
+        assert stated[name] == str(default).lower() or float(stated[name]) == default
