@@ -13,7 +13,7 @@ from estimators.belief import F32, OCCUPIED, UNKNOWN, ClearanceField, Lattice, M
 from estimators.rolling import transfer
 
 PAPER_STEP_S = 0.2  # the period that the paper's smoothing factor is meant for
-RATE_MASK = cv2.DIST_MASK_5  # within 2 % of the true distance, in a third of the time: enough for a rate
+RATE_MASK = cv2.DIST_MASK_5  # integer chamfer, within 2 % of the true distance in half the time: enough for a rate
 SECOND_NS = 1_000_000_000
 
 
@@ -23,14 +23,22 @@ class ClearanceSettings(Settings):
     rate_smoothing: float = Field(default=0.3, gt=0.0, le=1.0, description="weight of a new rate, per 0.2 s as in the paper")
 
 
-def distance_to(occupied: Mask, cell_m: float, mask_size: int = cv2.DIST_MASK_PRECISE) -> F32:
-    """Return the distance [m] from each cell's centre to that of the nearest occupied one, shape (rows, columns).
-
-    It is capped at the longer side of the lattice, which is also the answer where nothing is occupied.
-    """
+def _to_nearest(occupied: Mask, mask_size: int) -> F32:
+    """Return the distance [cells] to the nearest occupied cell as OpenCV gives it, capped at the longer side."""
     obstacles_as_zero = np.logical_not(occupied).view(np.uint8)
     cells = cv2.distanceTransform(obstacles_as_zero, cv2.DIST_L2, mask_size)
-    return np.asarray(np.minimum(cells, np.float32(max(occupied.shape))) * np.float32(cell_m), dtype=np.float32)
+    return np.minimum(cells, np.float32(max(occupied.shape)), dtype=np.float32)
+
+
+def distance_to(occupied: Mask, cell_m: float) -> F32:
+    """Return the distance [m] from each cell's centre to that of the nearest occupied one, shape (rows, columns).
+
+    It is capped at the longer side of the lattice, which is also the answer where nothing is occupied.  OpenCV's last bits
+    depend on where the array lies in memory; squares of distances are whole numbers of cells, so rounding them makes the
+    field exact and the same every time.
+    """
+    cells = _to_nearest(occupied, cv2.DIST_MASK_PRECISE)
+    return np.asarray(np.sqrt(np.rint(cells * cells)) * np.float32(cell_m), dtype=np.float32)
 
 
 def _field_of(grid: OccupancyGrid, rate: F32, known: Mask, overlap: Mask) -> ClearanceField:
@@ -79,7 +87,7 @@ class ClearanceEstimator:
         if elapsed_s > 0.0:
             cell_m = grid.lattice.cell_m
             was, now = (label == OCCUPIED) & overlap, (grid.label == OCCUPIED) & overlap
-            change = distance_to(now, cell_m, RATE_MASK) - distance_to(was, cell_m, RATE_MASK)
+            change = (_to_nearest(now, RATE_MASK) - _to_nearest(was, RATE_MASK)) * np.float32(cell_m)
             weight = 1.0 - (1.0 - self._settings.rate_smoothing) ** (elapsed_s / PAPER_STEP_S)
             rate += np.float32(weight) * (change / np.float32(elapsed_s) - rate)
         return overlap, rate * overlap

@@ -82,8 +82,8 @@ class PoseTrail:
         self._times_ns.append(time_ns)
         self._poses.append(pose)
         self._twist = twist
-        stale = bisect_right(self._times_ns, time_ns - self._span_ns)
-        del self._times_ns[: stale - 1], self._poses[: stale - 1]  # one is kept from before the span
+        stale = max(0, bisect_right(self._times_ns, time_ns - self._span_ns) - 1)  # one is kept from before the span
+        del self._times_ns[:stale], self._poses[:stale]
 
     def at(self, time_ns: int) -> SE2:
         """Return the pose at a time; the oldest one for what lies before the trail."""
