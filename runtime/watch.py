@@ -22,6 +22,7 @@ class _Seen:
     newest: Stamp | None = None
     expired_commands: int = 0
     arrivals: deque[tuple[int, int]] = field(default_factory=deque)  # (tick time, samples) within the rate window
+    arrived: int = 0  # samples in it
 
 
 class DeviceWatch:
@@ -66,6 +67,7 @@ class DeviceWatch:
                 seen.newest, fresh = stamp, fresh + 1
         if fresh:
             seen.arrivals.append((now_ns, fresh))
+            seen.arrived += fresh
         if seen.newest is None:
             return [self._not_started(health.device, now_ns)]
         return self._late(health, seen, now_ns) + self._slow(health, seen, now_ns)
@@ -91,12 +93,11 @@ class DeviceWatch:
 
     def _slow(self, health: DeviceHealth, seen: _Seen, now_ns: int) -> list[FaultReport]:
         while len(seen.arrivals) > 1 and seen.arrivals[0][0] < now_ns - RATE_WINDOW_NS:
-            seen.arrivals.popleft()
+            seen.arrived -= seen.arrivals.popleft()[1]
         watched_ns = now_ns - (self._start_ns or 0) - self._settings.startup_grace_s * SECOND_NS
         if watched_ns < RATE_WINDOW_NS:
             return []
-        expected = RATE_WINDOW_NS / health.expected_period_ns
-        ratio = sum(count for _, count in seen.arrivals) / expected
+        ratio = seen.arrived * health.expected_period_ns / RATE_WINDOW_NS
         if ratio >= self._settings.lowest_rate_ratio:
             return []
         return [FaultReport(Fault.WRONG_RATE, health.device, f"{100 * ratio:.0f} % of its rate over two seconds")]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -43,7 +43,7 @@ class OmniThreeWheel:
     wheel with a roller angle of zero).
 
     >>> base = OmniThreeWheel.symmetric(wheel_radius_m=0.05, wheel_distance_m=0.1)
-    >>> base.twist(base.wheel_rates(BodyTwist(0.3, -0.2, 0.5))).vx
+    >>> round(base.twist(base.wheel_rates(BodyTwist(0.3, -0.2, 0.5))).vx, 12)
     0.3
     """
 
@@ -51,6 +51,18 @@ class OmniThreeWheel:
     wheel_distance_m: tuple[float, float, float]  # from the base's origin to each wheel
     wheel_bearing_rad: tuple[float, float, float]  # direction from the origin to each wheel
     heading_error_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of the rolling direction, off the tangent
+    rates_from_twist: Array = field(init=False, repr=False, compare=False)  # (3, 3)
+    _twist_from_rates: Array = field(init=False, repr=False, compare=False)  # (3, 3)
+
+    def __post_init__(self) -> None:
+        """Work out both matrices once; a base is asked hundreds of times a second."""
+        radius = np.array(self.wheel_radius_m)
+        bearing, heading = np.array(self.wheel_bearing_rad), np.array(self.heading_error_rad)
+        rolling = bearing + math.pi / 2.0 + heading
+        lever = np.array(self.wheel_distance_m) * np.cos(heading)
+        rates = np.stack((np.cos(rolling), np.sin(rolling), lever), axis=1) / radius[:, None]
+        object.__setattr__(self, "rates_from_twist", rates)
+        object.__setattr__(self, "_twist_from_rates", np.linalg.inv(rates))
 
     @classmethod
     def symmetric(cls, wheel_radius_m: float, wheel_distance_m: float, first_bearing_rad: float = 0.0) -> OmniThreeWheel:
@@ -64,23 +76,13 @@ class OmniThreeWheel:
         """Number of wheels."""
         return 3
 
-    @property
-    def rates_from_twist(self) -> Array:
-        """The matrix from (vx, vy, wz) to wheel rates, shape (3, 3)."""
-        radius = np.array(self.wheel_radius_m)
-        bearing, heading = np.array(self.wheel_bearing_rad), np.array(self.heading_error_rad)
-        rolling = bearing + math.pi / 2.0 + heading
-        lever = np.array(self.wheel_distance_m) * np.cos(heading)
-        rows: Array = np.stack((np.cos(rolling), np.sin(rolling), lever), axis=1)
-        return np.asarray(rows / radius[:, None], dtype=np.float64)
-
     def wheel_rates(self, twist: BodyTwist) -> Array:
         """Return the wheel rates [rad/s], shape (3,)."""
         return np.asarray(self.rates_from_twist @ np.array([twist.vx, twist.vy, twist.wz]), dtype=np.float64)
 
     def twist(self, wheel_rates: Array) -> BodyTwist:
         """Return the twist that three wheel rates [rad/s] give; exact, the matrix is square."""
-        return _twist_of(np.linalg.solve(self.rates_from_twist, wheel_rates))
+        return _twist_of(self._twist_from_rates @ wheel_rates)
 
 
 @dataclass(frozen=True, slots=True)
