@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from drivers.interface.commands import BodyTwist
 from drivers.interface.errors import ConfigurationError
-from estimators.belief import Belief
+from drivers.interface.samples import frozen_array
+from estimators.belief import Belief, Lattice
 from estimators.field_query import sample
 from planners.dwa.kernels import Objective, Surroundings, advance, choose, visible_along
 from planners.dwa.recovery import LookAround
@@ -63,8 +64,10 @@ class DynamicWindow:
         self._recovery = LookAround(s.stall_s, min(s.look_around_rad_s, setup.limits.velocity.wz), setup.period_s)
 
     def warm_up(self) -> None:
-        """Compile the kernels, on an empty field."""
-        around = Surroundings(np.ones((3, 3), np.float32), np.zeros((3, 3), np.uint8), 0.0, 0.0, 1.0, 0.1, 0.1)
+        """Compile the kernels, on an empty field; its arrays are read-only as a belief's are, which is a type of its own."""
+        field, label = frozen_array(np.ones((3, 3), np.float32)), frozen_array(np.zeros((3, 3), np.uint8))
+        sample(field, Lattice(0.0, 0.0, 1.0, 3, 3), np.zeros((1, 2)))
+        around = Surroundings(field, label, 0.0, 0.0, 1.0, 0.1, 0.1)
         goal = Objective(np.ones(2), 1.0, 0.5, 1.0, 1.0, 1.0, self._weights)
         choose(np.zeros(3), np.zeros(3), np.ones((1, 3)), np.ones(2), 0.1, 1.0, 0.1, 2, around, goal)
         visible_along(np.zeros((2, 2)), 1.0, around)

@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from drivers.interface.commands import BodyTwist, Command
+from drivers.interface.samples import frozen_array
 from drivers.interface.settings import Settings
 from estimators.belief import Belief
 from planners.planner import Diagnostics
@@ -74,8 +75,9 @@ class FieldCbf:
         )
 
     def warm_up(self) -> None:
-        """Compile the kernels, on an empty field."""
-        field, none, zero = np.zeros((3, 3), np.float32), np.zeros((3, 3), np.bool_), np.zeros(2)
+        """Compile the kernels, on an empty field; its arrays are read-only as a belief's are, which is a type of its own."""
+        field, none = frozen_array(np.zeros((3, 3), np.float32)), frozen_array(np.zeros((3, 3), np.bool_))
+        zero = np.zeros(2)
         filter_velocity(field, field, none, zero, 1.0, np.zeros(3), zero, zero, zero, self._barrier)
 
     def filter(self, command: Command, belief: Belief, reachable: ReachableSet) -> Filtered:
