@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from importlib import resources
 from typing import Any, ClassVar
 
 import mujoco
@@ -17,17 +16,14 @@ from drivers.interface.errors import DeviceError
 from drivers.interface.samples import JointSample, Stamp, frozen_array
 from drivers.interface.seeds import stream
 from drivers.interface.settings import Settings
+from sim_drivers.arm_model import LEAD_S, attach_panda, panda_joint
 from sim_drivers.arm_motion import JOINTS, PANDA, TrajectoryFollower, fault_of
 from sim_drivers.delivery import Delivery
-from sim_drivers.world import FLOOR_BIT, OBSTACLE_BIT, SECOND_NS, MujocoWorld, require_world
+from sim_drivers.world import SECOND_NS, MujocoWorld, require_world
 
 Joints = tuple[float, float, float, float, float, float, float]
 
 READY_RAD: Joints = (0.0, -math.pi / 4, 0.0, -3 * math.pi / 4, 0.0, math.pi / 2, math.pi / 4)  # Franka's "ready" pose
-STIFFNESS_NM_RAD = np.array([3000.0, 3000.0, 3000.0, 2500.0, 2500.0, 2000.0, 2000.0])  # libfranka's own examples' impedance
-DAMPING_NM_S_RAD = np.array([140.0, 140.0, 120.0, 110.0, 55.0, 45.0, 42.0])  # near critical with the rotors' inertia
-# Inertia of the rotors seen through the gears, as Franka gave it to the authors of Drake's model (of the FR3, same drives).
-ROTOR_INERTIA_KG_M2 = (0.6057, 0.6057, 0.4625, 0.4625, 0.2055, 0.2055, 0.2055)
 
 
 class ArmSettings(Settings):
@@ -120,26 +116,15 @@ class SimArm:
     def build(self, spec: Any, base: Any) -> None:
         """Attach the model in `configs/models/panda.urdf` to the base, with a servo for each joint."""
         s = self._settings
-        arm = mujoco.MjSpec.from_string(resources.files("configs").joinpath("models/panda.urdf").read_text(encoding="utf-8"))
-        arm.compiler.fusestatic = False  # keep the flange
-        for body in arm.bodies:
-            body.gravcomp = 1.0
-        for geom in arm.geoms:
-            geom.contype, geom.conaffinity = 0, FLOOR_BIT | OBSTACLE_BIT
-        for joint, rotor in zip(arm.joints, ROTOR_INERTIA_KG_M2, strict=True):
-            joint.armature = rotor
-        half_yaw = s.mount_yaw_rad / 2
-        mount = base.add_frame(pos=[s.mount_x_m, s.mount_y_m, s.mount_z_m], quat=[math.cos(half_yaw), 0, 0, math.sin(half_yaw)])
-        spec.attach(arm, frame=mount, prefix=f"{self._setup.name}_")
-        for index in range(JOINTS):
-            _add_position_servo(spec, self._joint(index), index)
+        attach_panda(spec, base, self._setup.name, (s.mount_x_m, s.mount_y_m, s.mount_z_m), s.mount_yaw_rad)
 
     def bind(self, world: MujocoWorld) -> None:
         """Look up the joints and put them where they start."""
         model, data = world.model, world.data
-        joint = model.joint(self._joint(0))
+        joint_name = panda_joint(self._setup.name, 0)
+        joint = model.joint(joint_name)
         first, dof = int(joint.qposadr[0]), int(joint.dofadr[0])
-        servo = int(model.actuator(self._joint(0)).id)
+        servo = int(model.actuator(joint_name).id)
         self._qpos, self._dof, self._ctrl = (slice(start, start + JOINTS) for start in (first, dof, servo))
         data.qpos[self._qpos] = self._settings.start_rad
         mujoco.mj_step1(model, data)
@@ -150,9 +135,7 @@ class SimArm:
             applies_ns, trajectory, expires_ns = self._pending.pop(0)
             self._follower.follow(trajectory, expires_ns, applies_ns)
         self._follower.step(world.now_ns)
-        # The servo damps the joint's own velocity, so the set point leads by what damping would hold it back.
-        lead = DAMPING_NM_S_RAD / STIFFNESS_NM_RAD * self._follower.velocity_rad_s
-        world.data.ctrl[self._ctrl] = self._follower.position_rad + lead
+        world.data.ctrl[self._ctrl] = self._follower.position_rad + LEAD_S * self._follower.velocity_rad_s
         if self._state is DeviceState.OPEN and world.now_ns >= self._next_ns:
             self._measure(world)
 
@@ -174,21 +157,8 @@ class SimArm:
     def _after(self, now_ns: int) -> int:
         return (now_ns // self._sample_period_ns + 1) * self._sample_period_ns
 
-    def _joint(self, index: int) -> str:
-        return f"{self._setup.name}_panda_joint{index + 1}"
-
     def _reset(self) -> None:
         self._rng = stream(self._setup.seed, f"{self._setup.name}.joints")
         self._delivery: Delivery[JointSample] = Delivery(round(self._settings.latency_s * SECOND_NS), self._settings.capacity)
         self._sequence = self._dropped = self._follower.expired = 0
         self._next_ns = self._after(self._world.now_ns)
-
-
-def _add_position_servo(spec: Any, joint: str, index: int) -> None:
-    servo = spec.add_actuator(name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-    stiffness, damping, limit = STIFFNESS_NM_RAD[index], DAMPING_NM_S_RAD[index], PANDA.torque_nm[index]
-    servo.gainprm[0] = stiffness
-    servo.biastype = mujoco.mjtBias.mjBIAS_AFFINE
-    servo.biasprm[1:3] = -stiffness, -damping
-    servo.forcelimited = True
-    servo.forcerange = [-limit, limit]

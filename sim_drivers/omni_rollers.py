@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.interface.kinematics import OmniThreeWheel
-from sim_drivers.wheeled_base import add_velocity_servo, set_inertia
+from sim_drivers.mechanics import add_velocity_servo, set_inertia
 from sim_drivers.world import FLOOR_BIT, OBSTACLE_BIT, MujocoWorld
 
 WHEELS = ("wheel_0", "wheel_1", "wheel_2")

@@ -13,8 +13,9 @@ from pydantic import Field
 from drivers.interface.devices import DeviceSetup
 from drivers.interface.kinematics import SkidSteer
 from drivers.interface.settings import Settings
+from sim_drivers.mechanics import add_velocity_servo, set_inertia
 from sim_drivers.wheel_encoders import EncoderSettings
-from sim_drivers.wheeled_base import WheeledBase, WheeledBaseSettings, add_velocity_servo, set_inertia
+from sim_drivers.wheeled_base import WheeledBase, WheeledBaseSettings
 from sim_drivers.world import FLOOR_BIT, OBSTACLE_BIT, MujocoWorld
 
 Fraction = Annotated[float, Field(ge=-0.2, le=0.2)]
@@ -48,7 +49,8 @@ class SkidSteerSettings(WheeledBaseSettings):
         description="nominal; measured in the simulator, and near track + wheelbase^2 / track, where point contacts balance",
     )
     wheel_radius_error: tuple[Fraction, Fraction, Fraction, Fraction] = Field(
-        default=(0.002, -0.001, 0.001, -0.002), description="how much larger each wheel really is, as a fraction (tyre pressure)"
+        default=(0.001, -0.0005, 0.0005, -0.001),
+        description="how much larger each wheel really is, as a fraction (air)",
     )
     friction: float = Field(default=0.6, gt=0.05, le=2.0, description="between tyres and floor")
     wheel_torque_nm: float = Field(default=8.0, gt=0.0, le=100.0, description="what a wheel's motor gives at most")

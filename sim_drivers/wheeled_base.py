@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, Protocol
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
@@ -155,20 +153,3 @@ def _matrix_of(kinematics: WheelKinematics, limits: BaseLimits) -> NDArray[np.fl
     forwards = kinematics.wheel_rates(BodyTwist(vx=1.0))
     sideways = kinematics.wheel_rates(BodyTwist(vy=1.0)) if limits.holonomic else np.zeros_like(forwards)
     return np.stack((forwards, sideways, kinematics.wheel_rates(BodyTwist(wz=1.0))), axis=1)
-
-
-def add_velocity_servo(spec: Any, joint: str, gain: float, limit: float) -> None:
-    """Add an actuator that drives a joint at the speed set as its control, with force `gain` times the error up to `limit`."""
-    servo = spec.add_actuator(name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-    servo.gainprm[0] = gain
-    servo.biastype = mujoco.mjtBias.mjBIAS_AFFINE
-    servo.biasprm[2] = -gain
-    servo.forcelimited = True
-    servo.forcerange = [-limit, limit]
-
-
-def set_inertia(body: Any, mass_kg: float, centre_m: Sequence[float], inertia_kg_m2: Sequence[float]) -> None:
-    """Give a body its mass, centre of mass and principal moments, whatever geoms it has."""
-    body.explicitinertial = True
-    # Without an explicit centre MuJoCo 4.0 takes the body's own position in its parent for it.
-    body.mass, body.ipos, body.inertia = mass_kg, list(centre_m), list(inertia_kg_m2)

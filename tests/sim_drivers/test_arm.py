@@ -5,12 +5,13 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from drivers.interface.commands import JointTrajectory
+from drivers.interface.commands import BodyTwist, JointTrajectory
 from drivers.interface.devices import Arm, DeviceSetup
 from drivers.interface.errors import DeviceError
 from drivers.interface.geometry import SE2
 from sim_drivers.arm import READY_RAD, ArmSettings, SimArm
 from sim_drivers.arm_motion import PANDA
+from sim_drivers.omni_base import OmniBaseSettings, SimOmniBase
 from sim_drivers.scene import Scene
 from sim_drivers.world import MujocoWorld, WorldSettings
 
@@ -193,3 +194,19 @@ def test_the_seed_decides():
 
     assert run(1).tobytes() == run(1).tobytes()
     assert run(1).tobytes() != run(2).tobytes()
+
+
+def test_rides_on_a_base_as_one_robot():
+    world = MujocoWorld(Scene("test", SE2(), (), 60.0, ()), WorldSettings())
+    base = SimOmniBase(OmniBaseSettings(mass_kg=60.0, radius_m=0.35), DeviceSetup("base", 1, lambda: world.now_ns, world))
+    arm = SimArm(ArmSettings(mount_x_m=0.1, mount_z_m=0.4), DeviceSetup("arm", 1, lambda: world.now_ns, world))
+    world.compile()
+    base.open()
+    arm.open()
+    arm.command(move(), 5000 * MS)
+    base.command(BodyTwist(0.4, 0.0, 0.0), 2000 * MS)
+    world.step_to(4000 * MS)
+    assert 0.6 < world.data.body("base").xpos[0] < 0.9
+    assert np.abs(arm.drain()[-1].position_rad - GOAL).max() < 1e-3
+    flange = world.data.body("base").xpos + np.array([0.1, 0.0, 0.4]) + flange_by_dh(GOAL)[:3, 3]
+    np.testing.assert_allclose(world.data.body("arm_panda_link8").xpos, flange, atol=0.03)  # the base turned a little
