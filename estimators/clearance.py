@@ -41,6 +41,14 @@ def distance_to(occupied: Mask, cell_m: float) -> F32:
     return np.asarray(np.sqrt(np.rint(cells * cells)) * np.float32(cell_m), dtype=np.float32)
 
 
+def _bounding_box(mask: Mask) -> tuple[slice, slice]:
+    """Return the rows and columns that hold every set cell; the first cell where none is set."""
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    if not rows.size:
+        return slice(0, 1), slice(0, 1)
+    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+
+
 def _field_of(grid: OccupancyGrid, rate: F32, known: Mask, overlap: Mask) -> ClearanceField:
     clearance = distance_to(grid.label == OCCUPIED, grid.lattice.cell_m)
     return ClearanceField(
@@ -85,11 +93,11 @@ class ClearanceEstimator:
         overlap = known & (label != UNKNOWN)
         elapsed_s = (stamp_ns - self._stamp_ns) / SECOND_NS
         if elapsed_s > 0.0:
-            cell_m = grid.lattice.cell_m
-            was, now = (label == OCCUPIED) & overlap, (grid.label == OCCUPIED) & overlap
-            change = (_to_nearest(now, RATE_MASK) - _to_nearest(was, RATE_MASK)) * np.float32(cell_m)
-            weight = 1.0 - (1.0 - self._settings.rate_smoothing) ** (elapsed_s / PAPER_STEP_S)
-            rate += np.float32(weight) * (change / np.float32(elapsed_s) - rate)
+            weight = np.float32(1.0 - (1.0 - self._settings.rate_smoothing) ** (elapsed_s / PAPER_STEP_S))
+            box = _bounding_box(overlap)  # nothing outside it counts, and no shortest way leaves it
+            was, now = (labels[box] == OCCUPIED for labels in (label, grid.label))
+            change_cells = _to_nearest(now & overlap[box], RATE_MASK) - _to_nearest(was & overlap[box], RATE_MASK)
+            rate[box] += weight * (change_cells * np.float32(grid.lattice.cell_m / elapsed_s) - rate[box])
         return overlap, rate * overlap
 
     def snapshot(self) -> bytes:

@@ -93,9 +93,9 @@ class DepthGrid:
         lattice = lattice_in_reach(x, y, settings.range_max_m, cell_m)
         camera = ((x - lattice.x_m) / cell_m, (y - lattice.y_m) / cell_m)
         hits = np.zeros((lattice.rows, lattice.columns), dtype=np.int32)
-        ends = np.zeros((lattice.rows, lattice.columns), dtype=np.uint8)
-        self._collect(frame, rotation, camera, hits, ends)
-        grid = label_frame(lattice, hits, ends, camera, settings.hits_min, settings.component_cells_min)
+        free_ends = np.zeros((lattice.rows, lattice.columns), dtype=np.uint8)
+        self._collect(frame, rotation, camera, hits, free_ends)
+        grid = label_frame(lattice, hits, free_ends, camera, settings.hits_min, settings.component_cells_min)
         return FrameLabels(grid, frozen_array(self._blind(frame, rotation, camera, grid.label.shape)))
 
     def _collect(
@@ -104,7 +104,7 @@ class DepthGrid:
         rotation: F64,
         camera: tuple[float, float],
         hits: NDArray[np.int32],
-        ends: U8,
+        free_ends: U8,
     ) -> None:
         settings, k, unit = self._settings, frame.intrinsics, frame.depth_unit_m
         depth = np.ascontiguousarray(frame.depth).view()
@@ -122,7 +122,7 @@ class DepthGrid:
             (settings.slab_low_m, settings.slab_high_m),
             (settings.range_min_m, settings.range_max_m),
             hits,
-            ends,
+            free_ends,
         )
 
     def _blind(self, frame: DepthFrame, rotation: F64, camera: tuple[float, float], shape: tuple[int, ...]) -> Mask:

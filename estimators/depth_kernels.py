@@ -5,23 +5,66 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from estimators.belief import F64, U8
-from estimators.label_kernels import FREE_END, HIT_END
 
 U16 = NDArray[Any]
 I32 = NDArray[Any]
 
 
+NOTHING = np.int32(np.iinfo(np.int32).min)  # what a pixel's ray that is not to be followed says
+
+Ray = tuple[float, float, float]  # x, y and z in odom, per metre of depth
+
+
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _row_is_useless(lowest: float, highest: float, slab_low: float, slab_high: float, range_min: float) -> bool:
+def _row_is_useless(lowest: float, highest: float, slab: tuple[float, float], range_min: float) -> bool:
     """Tell whether every ray of a row, with rises between the two given, has left the slab before the minimum range."""
-    return lowest * range_min > slab_high or highest * range_min < slab_low
+    return lowest * range_min > slab[1] or highest * range_min < slab[0]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _end_rays(
+    row: U16,  # (width,)
+    raw_limits: tuple[int, int],
+    depth_unit_m: float,
+    first: Ray,
+    step: Ray,
+    camera: tuple[float, float],
+    cells_per_m: float,
+    slab: tuple[float, float],
+    ranges: tuple[float, float],
+    columns: np.int32,
+    ends: I32,  # (width,), written
+) -> None:
+    """Write for each pixel of a row the flat index of the cell where its ray hits, its complement where it ends unhindered.
+
+    Without branches and without writes to the grid, so that it vectorises; `_count` does the rest.
+    """
+    for u in range(len(row)):
+        dx, dy, rise = first[0] + step[0] * u, first[1] + step[1] * u, first[2] + step[2] * u
+        z = row[u] * depth_unit_m
+        leaves = (slab[1] / rise if rise > 0.0 else slab[0] / rise) if rise != 0.0 else math.inf
+        reach = min(leaves, ranges[1] / math.sqrt(dx * dx + dy * dy))
+        end = min(z, reach)
+        index = np.int32(camera[1] + end * dy * cells_per_m) * columns + np.int32(camera[0] + end * dx * cells_per_m)
+        useful = (row[u] >= raw_limits[0]) & (row[u] <= raw_limits[1]) & (leaves >= ranges[0])
+        ends[u] = (index if z <= reach else ~index) if useful else NOTHING
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _count(ends: I32, hits: I32, free_ends: U8) -> None:
+    for end in ends:
+        if end >= 0:
+            hits[end] += 1
+        elif end != NOTHING:
+            free_ends[~end] = 1
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def collect_depth(
     depth: U16,  # (height, width)
     raw_limits: tuple[int, int],  # lowest and highest raw value that is trusted
@@ -33,43 +76,27 @@ def collect_depth(
     slab: tuple[float, float],  # offsets from the camera's height [m], low <= 0 <= high
     ranges: tuple[float, float],  # minimum depth and maximum planar range [m]
     hits: I32,  # (rows, columns), counted up
-    ends: U8,  # (rows, columns), FREE_END and HIT_END are set
+    free_ends: U8,  # (rows, columns), set to 1
 ) -> None:
-    """Count the returns inside the slab per cell and mark the cell in which each ray ends.
+    """Count the returns inside the slab per cell, and mark the cells in which the other rays end.
 
     A ray with a valid depth is known to be empty up to the return.  It counts up to where it hits inside the slab, leaves
     the slab, or reaches the maximum range.  A pixel without a valid depth says nothing; a ray that leaves the slab before
     the minimum range is not worth following.
     """
     fx, fy, cx, cy = pinhole
-    slab_low, slab_high = slab
-    range_min, range_max = ranges
-    r00, r10, r20 = rotation[0, 0] / fx, rotation[1, 0] / fx, rotation[2, 0] / fx
-    last = depth.shape[1] - 1
+    last, columns = depth.shape[1] - 1, np.int32(hits.shape[1])
+    right, down, ahead = rotation[:, 0] / fx, rotation[:, 1] / fy, rotation[:, 2]
+    step = (right[0], right[1], right[2])
+    ends = np.empty(depth.shape[1], dtype=np.int32)
     for v in range(depth.shape[0]):
-        b = (v - cy) / fy
-        x0 = rotation[0, 1] * b + rotation[0, 2] - r00 * cx
-        y0 = rotation[1, 1] * b + rotation[1, 2] - r10 * cx
-        z0 = rotation[2, 1] * b + rotation[2, 2] - r20 * cx
-        if _row_is_useless(min(z0, z0 + r20 * last), max(z0, z0 + r20 * last), slab_low, slab_high, range_min):
+        left = ahead + down * (v - cy) - right * cx
+        rise, last_rise = left[2], left[2] + right[2] * last
+        if _row_is_useless(min(rise, last_rise), max(rise, last_rise), slab, ranges[0]):
             continue
-        for u in range(last + 1):
-            raw = depth[v, u]
-            if raw < raw_limits[0] or raw > raw_limits[1]:
-                continue
-            dx, dy, rise = x0 + r00 * u, y0 + r10 * u, z0 + r20 * u  # of the ray, per metre of depth
-            z = raw * depth_unit_m
-            height, planar_squared = z * rise, dx * dx + dy * dy
-            hit = slab_low <= height <= slab_high and z * z * planar_squared <= range_max * range_max
-            if not hit:
-                leaves = (slab_high if rise > 0.0 else slab_low) / rise if rise != 0.0 else math.inf
-                if leaves < range_min:
-                    continue
-                z = min(leaves, range_max / math.sqrt(planar_squared))
-            column, row = int(camera[0] + z * dx / cell_m), int(camera[1] + z * dy / cell_m)
-            if hit:
-                hits[row, column] += 1
-            ends[row, column] |= HIT_END if hit else FREE_END
+        first = (left[0], left[1], left[2])
+        _end_rays(depth[v], raw_limits, depth_unit_m, first, step, camera, 1.0 / cell_m, slab, ranges, columns, ends)
+        _count(ends, hits.reshape(-1), free_ends.reshape(-1))
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -7,16 +7,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from estimators.belief import FREE, OCCUPIED, U8, UNKNOWN
 
-FREE_END = np.uint8(1)  # a ray ends here that was still unobstructed
-HIT_END = np.uint8(2)  # a ray ends here at a surface
-
 Occupied = NDArray[Any]  # (rows, columns) uint8, 1 or 0
+Counts = NDArray[Any]  # (rows, columns) int32
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -81,19 +78,20 @@ def is_hidden(occupied: Occupied, row0: int, column0: int, row1: int, column1: i
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def label_cells(occupied: Occupied, ends: U8, row0: int, column0: int, label: U8) -> None:
+def label_cells(occupied: Occupied, hits: Counts, free_ends: U8, row0: int, column0: int, label: U8) -> None:
     """Write the labels of all cells as seen from the cell (row0, column0).
 
-    With O the occupied cells, B those behind them and F the traced ones: O without B is occupied, F without B is free,
-    and everything else, B included, is unknown.
+    A ray ends where there are returns, or where `free_ends` says that it was still unobstructed.  With O the occupied
+    cells, B those behind them and F the traced ones: O without B is occupied, F without B is free, and everything else, B
+    included, is unknown.
     """
     label[:] = UNKNOWN
-    for row in range(ends.shape[0]):
-        for column in range(ends.shape[1]):
-            if ends[row, column]:
-                _trace_free(occupied, label, row0, column0, row, column, (ends[row, column] & FREE_END) != 0)
-    for row in range(ends.shape[0]):
-        for column in range(ends.shape[1]):
+    for row in range(label.shape[0]):
+        for column in range(label.shape[1]):
+            if hits[row, column] > 0 or free_ends[row, column]:
+                _trace_free(occupied, label, row0, column0, row, column, free_ends[row, column] != 0)
+    for row in range(label.shape[0]):
+        for column in range(label.shape[1]):
             if occupied[row, column]:
                 label[row, column] = OCCUPIED
             if label[row, column] != UNKNOWN and is_hidden(occupied, row0, column0, row, column):

@@ -59,13 +59,13 @@ def keep_large_components(mask: U8, cells_min: int) -> U8:
 
 
 def label_frame(
-    lattice: Lattice, hits: NDArray[Any], ends: U8, camera: tuple[float, float], hits_min: int, cells_min: int
+    lattice: Lattice, hits: NDArray[Any], free_ends: U8, camera: tuple[float, float], hits_min: int, cells_min: int
 ) -> OccupancyGrid:
-    """Return the labelled grid from counted returns and marked ray ends, each (rows, columns).
+    """Return the labelled grid from counted returns and the ends of unobstructed rays, each (rows, columns).
 
     `camera` is the sensor's x, y in cells from the lattice's corner.
     """
     occupied = keep_large_components((hits >= hits_min).astype(np.uint8), cells_min)
     label = np.empty(hits.shape, dtype=np.uint8)
-    label_cells(occupied, ends, int(camera[1]), int(camera[0]), label)
+    label_cells(occupied, hits, free_ends, int(camera[1]), int(camera[0]), label)
     return OccupancyGrid(lattice, frozen_array(label))

@@ -15,7 +15,6 @@ from drivers.interface.samples import RangeScan, Stamp, frozen_array
 from drivers.interface.sensed import Sensed
 from drivers.interface.settings import Settings
 from estimators.belief import F64, U8
-from estimators.label_kernels import FREE_END, HIT_END
 from estimators.labelling import FrameLabels, label_frame, lattice_in_reach
 
 
@@ -36,7 +35,7 @@ def _collect_scan(
     scanner: tuple[float, float],  # x, y in cells from the lattice's corner
     limits_cells: tuple[float, float],
     hits: NDArray[Any],  # (rows, columns) int32, counted up
-    ends: U8,  # (rows, columns)
+    free_ends: U8,  # (rows, columns)
 ) -> None:
     for beam in range(len(range_cells)):
         reach = range_cells[beam]
@@ -47,7 +46,8 @@ def _collect_scan(
         row, column = int(scanner[1] + reach * math.sin(angle)), int(scanner[0] + reach * math.cos(angle))
         if hit:
             hits[row, column] += 1
-        ends[row, column] |= HIT_END if hit else FREE_END
+        else:
+            free_ends[row, column] = 1
 
 
 def is_sound(scan: RangeScan) -> bool:
@@ -84,10 +84,10 @@ class ScanGrid:
         lattice = lattice_in_reach(odom_from_base.x, odom_from_base.y, settings.range_max_m, cell_m)
         scanner = ((odom_from_base.x - lattice.x_m) / cell_m, (odom_from_base.y - lattice.y_m) / cell_m)
         hits = np.zeros((lattice.rows, lattice.columns), dtype=np.int32)
-        ends = np.zeros((lattice.rows, lattice.columns), dtype=np.uint8)
+        free_ends = np.zeros((lattice.rows, lattice.columns), dtype=np.uint8)
         reach_m = min(settings.range_max_m, scan.range_max_m)
         limits = (settings.range_min_m / cell_m, reach_m / cell_m)
         first_rad = odom_from_base.yaw + scan.angle_min_rad
-        _collect_scan(scan.range_m / cell_m, first_rad, float(scan.angle_step_rad), scanner, limits, hits, ends)
-        grid = label_frame(lattice, hits, ends, scanner, settings.hits_min, settings.component_cells_min)
+        _collect_scan(scan.range_m / cell_m, first_rad, float(scan.angle_step_rad), scanner, limits, hits, free_ends)
+        grid = label_frame(lattice, hits, free_ends, scanner, settings.hits_min, settings.component_cells_min)
         return FrameLabels(grid, frozen_array(np.zeros(hits.shape, dtype=np.bool_)))
