@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from drivers.interface.commands import Command
+from drivers.interface.commands import BodyTwist, Command
 from drivers.interface.settings import Settings
 from estimators.belief import Belief
 from planners.shield import Filtered, ReachableSet, ShieldSetup
@@ -23,10 +23,10 @@ class NoShield:
         """Nothing to compile."""
 
     def filter(self, command: Command, belief: Belief, reachable: ReachableSet) -> Filtered:
-        """Return the command with its twist clipped into `reachable`."""
+        """Return the command with its twist clipped into `reachable`; one that is not finite counts as a stop."""
         if command.base is None:
             return Filtered(command)
-        twist = reachable.clip(command.base)
+        twist = reachable.clip(command.base if command.base.finite else BodyTwist())
         return Filtered(replace(command, base=twist), intervened=twist != command.base)
 
     def snapshot(self) -> bytes:
