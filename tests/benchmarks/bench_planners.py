@@ -1,4 +1,4 @@
-"""One call of each planner, shield and router, in a walled corridor with two pillars, the robot near one of them, which moves towards it."""
+"""One call of each planner, shield and router: a walled corridor, two pillars, one of them coming towards the robot."""
 
 from collections.abc import Callable
 
