@@ -8,8 +8,6 @@ sensor nothing is forgotten, since an obstacle there gives no return.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from pydantic import Field
 
@@ -17,9 +15,9 @@ from drivers.interface.geometry import SE2
 from drivers.interface.samples import frozen_array
 from drivers.interface.settings import Settings
 from drivers.interface.stateful import pack, unpack
-from estimators.belief import FREE, UNKNOWN, Lattice, OccupancyGrid
+from estimators.belief import UNKNOWN, Lattice, OccupancyGrid
 from estimators.labelling import FrameLabels
-from estimators.memory_kernels import fold
+from estimators.memory_kernels import fold, free_disc
 from estimators.rolling import lattice_around, transfer
 
 NEVER_NS = -(2**62)
@@ -70,6 +68,10 @@ class GridMemory:
 
     def follow(self, odom_from_base: SE2) -> None:
         """Roll the window along, so that the robot stands in its middle cell, and free the ground under it."""
+        self._roll(odom_from_base)
+        self._clear_footprint(odom_from_base)
+
+    def _roll(self, odom_from_base: SE2) -> None:
         old = self._lattice
         self._lattice = lattice_around(odom_from_base.x, odom_from_base.y, old.cell_m, old.rows, old.columns)
         if self._lattice != old:
@@ -78,11 +80,10 @@ class GridMemory:
             self._occupied_ns = transfer(self._occupied_ns, old, self._lattice, NEVER_NS)
             self._since_ns = transfer(self._since_ns, old, self._lattice, NEVER_NS)
             self._dynamic = transfer(self._dynamic, old, self._lattice, False)
-        self._clear_footprint(odom_from_base)
 
     def merge(self, frame: FrameLabels, stamp_ns: int, odom_from_base: SE2) -> None:
         """Fold in one frame that was captured at `stamp_ns` with the robot at `odom_from_base`."""
-        self.follow(odom_from_base)
+        self._roll(odom_from_base)
         source, settings = frame.grid.lattice, self._settings
         fold(
             self._label,
@@ -101,14 +102,9 @@ class GridMemory:
         self._clear_footprint(odom_from_base)
 
     def _clear_footprint(self, odom_from_base: SE2) -> None:
-        lattice, reach = self._lattice, math.ceil(self._radius_m / self._lattice.cell_m)
-        offsets = np.arange(-reach, reach + 1)
-        row, column = lattice.cell_of(np.array([[odom_from_base.x, odom_from_base.y]]))
-        rows, columns = (index.ravel() for index in np.meshgrid(row + offsets, column + offsets, indexing="ij"))
-        centres = lattice.centres(rows, columns)
-        under = np.hypot(centres[:, 0] - odom_from_base.x, centres[:, 1] - odom_from_base.y) <= self._radius_m
-        inside = (rows >= 0) & (rows < lattice.rows) & (columns >= 0) & (columns < lattice.columns)
-        self._label[rows[under & inside], columns[under & inside]] = FREE
+        lattice = self._lattice
+        x, y = (odom_from_base.x - lattice.x_m) / lattice.cell_m, (odom_from_base.y - lattice.y_m) / lattice.cell_m
+        free_disc(self._label, x, y, self._radius_m / lattice.cell_m)
 
     def snapshot(self) -> bytes:
         """Return the whole state."""

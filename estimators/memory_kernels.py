@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from numba import njit
@@ -45,3 +46,13 @@ def fold(
                     occupied_ns[at] = now_ns
                 elif now_ns - occupied_ns[at] > (dynamic_ns if dynamic[at] else static_ns):
                     label[at] = UNKNOWN
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def free_disc(label: U8, x: float, y: float, radius: float) -> None:
+    """Mark the cells free whose centres lie within a disc; centre and radius in cells from the lattice's corner."""
+    rows, columns = label.shape
+    for row in range(max(0, math.floor(y - radius)), min(rows, math.ceil(y + radius))):
+        for column in range(max(0, math.floor(x - radius)), min(columns, math.ceil(x + radius))):
+            if (column + 0.5 - x) ** 2 + (row + 0.5 - y) ** 2 <= radius**2:
+                label[row, column] = FREE
