@@ -5,7 +5,8 @@ field goes on as it is at the border (the point is clamped), so that value and g
 coordinate reads the lower border; callers check for NaN where it can occur.
 
 `bilinear` and `bilinear_gradient` are for use inside other numba kernels: the lattice comes as its numbers
-(`x_m`, `y_m`, `cell_m`, in this order), then the point.  `sample` and `gradient` take arrays of points.
+(`x_m`, `y_m`, `cell_m`, in this order), then the point.  `sample` and `gradient` take arrays of points.  numba compiles anew for
+read-only arrays, as those of a `Belief` are: warm up with such.
 """
 
 from __future__ import annotations

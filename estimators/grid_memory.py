@@ -4,6 +4,8 @@ Seen cells overwrite, unseen cells keep their label, free and unknown for as lon
 retention time.  There are two: what came to stand where it was free shortly before is taken for something that moves on, and
 is soon forgotten where it is no longer seen, so that a walker leaves no wall behind; in the blind zone right before the
 sensor nothing is forgotten, since an obstacle there gives no return.
+
+The two retentions stand for the two layers of Cui, Deng, Wang, section 4.1, whose fast one halves every 0.2 s.
 """
 
 from __future__ import annotations
@@ -29,7 +31,7 @@ class GridMemorySettings(Settings):
 
     window_m: float = Field(default=6.0, gt=0.5, le=40.0, description="side of the square window around the robot")
     static_retention_s: float = Field(default=60.0, gt=0.0, le=3600.0, description="for what has always stood there")
-    dynamic_retention_s: float = Field(default=1.0, gt=0.0, le=3600.0, description="for what came to stand where it was free")
+    dynamic_retention_s: float = Field(default=0.5, gt=0.0, le=3600.0, description="for what came to stand where it was free")
     recently_free_s: float = Field(default=3.0, ge=0.0, le=3600.0, description="how long ago 'it was free' counts")
     settle_s: float = Field(default=1.5, gt=0.0, le=3600.0, description="after so long in the same cell it counts as static")
 
