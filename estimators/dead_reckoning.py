@@ -54,7 +54,7 @@ class DeadReckoning:
         """Fold in every sample at its own capture time, then carry the last twist on to the tick."""
         latest_ns = latest_valid_ns(sensed)
         imu_valid = [self._take_gyro(sample, latest_ns) for sample in sensed.imu]
-        base_valid = [self._fold(sample, latest_ns) for sample in sensed.base]
+        base_valid = [self._fold(sample, latest_ns) for sample in self._leading(sensed.base)]
         faults = () if all(imu_valid + base_valid) else (EstimatorFault.INVALID_INPUT,)
         pose, covariance = self._trail.at(sensed.tick.start_ns), frozen_array(self._covariance.copy())
         return OdometryEstimate(pose, self._trail.twist, covariance, self._trail.newest_ns, faults)
@@ -62,6 +62,11 @@ class DeadReckoning:
     def pose_at(self, time_ns: int) -> SE2:
         """Return odom_from_base at a time of the recent past."""
         return self._trail.at(time_ns)
+
+    def _leading(self, samples: tuple[BaseSample, ...]) -> tuple[BaseSample, ...]:
+        """Return the wheel samples, or the poses of a device without; a pose beside wheels is for fusion, not for reckoning."""
+        wheels = tuple(sample for sample in samples if isinstance(sample, WheelSample))
+        return wheels if wheels or self._wheels_rad is not None else samples
 
     def _fold(self, sample: BaseSample, latest_ns: int) -> bool:
         """Take in one sample; False: it was dropped."""
@@ -107,8 +112,6 @@ class DeadReckoning:
 
     def _fold_pose(self, sample: PoseSample) -> bool:
         pose, before, captured_ns = sample.local_from_base, self._device_pose, sample.stamp.captured_ns
-        if self._wheels_rad is not None:
-            return True  # the wheels lead; a pose beside them is for fusion, not for dead reckoning
         if not all(math.isfinite(value) for value in (pose.x, pose.y, pose.yaw)):
             return False
         newest_ns, self._device_pose = self._trail.newest_ns, pose

@@ -165,6 +165,17 @@ def test_device_poses_start_at_the_identity():
     assert_pose(after.odom_from_base, estimate.odom_from_base)
 
 
+def test_beside_wheels_a_device_pose_is_left_alone():
+    samples, poses = samples_of(OMNI, [BodyTwist(0.4, 0.0, 0.0)] * 20)
+    beside = [PoseSample(s.stamp, SE2(9.0, 9.0, 1.0), None, np.zeros((3, 3))) for s in samples]
+    mixed = [one for pair in zip(beside, samples, strict=True) for one in pair]
+    odometry = reckoning(OMNI)
+    odometry.update(sensed(50 * MS, base=mixed[:20]))
+    estimate = odometry.update(sensed(100 * MS, base=[*mixed[20:], replace(beside[0], stamp=Stamp(100 * MS + 1, 0, 0))]))
+    assert estimate.faults == ()
+    assert_pose(estimate.odom_from_base, poses[20])
+
+
 def test_the_covariance_grows_with_the_way_and_sideways_most():
     samples, _ = samples_of(OMNI, [BodyTwist(0.5, 0.0, 0.0)] * 800)
     halfway = drive(reckoning(OMNI), samples[:401]).covariance
