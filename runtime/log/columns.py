@@ -25,7 +25,7 @@ class Kind(enum.Enum):
     FLOAT = pa.float64()
     FLAG = pa.bool_()
     TEXT = pa.string()
-    IMAGE = pa.list_(pa.uint8())  # a 16-bit image, RVL-coded
+    IMAGE = pa.list_(pa.field("item", pa.uint8(), nullable=False))  # a 16-bit image, RVL-coded
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,10 +67,10 @@ class Column:
             return pa.array([rvl.encode(image) for image in self.values], self.kind.value)
         return pa.array(self.values, self.kind.value)
 
-    def finished(self, flat: pa.Array) -> ArrowColumn:
-        """Return one list of values per tick."""
+    def finished(self, flat: pa.Array, ends: Sequence[int] | None = None) -> ArrowColumn:
+        """Return one list of values per tick, or per row that ends where told."""
         descriptor = IMAGE_COMPONENT if self.kind is Kind.IMAGE else rr.ComponentDescriptor(self.name)
-        offsets = pa.array(np.array([0, *self.ends], np.int32))
+        offsets = pa.array(np.array([0, *(self.ends if ends is None else ends)], np.int32))
         return ArrowColumn(descriptor, pa.ListArray.from_arrays(offsets, flat))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import fields
-from typing import Any, get_type_hints
+from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 import pyarrow as pa
@@ -16,7 +16,15 @@ from runtime.log.checksum import Cells, checksums
 from runtime.log.columns import ArrowColumn, Column, Kind
 from runtime.log.schema import Schema
 
-Batch = tuple[str, list[ArrowColumn]]  # an entity and its columns, one row a tick
+
+class Batch(NamedTuple):
+    """Columns of one entity, one row for each of the ticks in `rows` (None: all of the batch)."""
+
+    entity: str
+    columns: list[ArrowColumn]
+    rows: Sequence[int] | None = None
+
+
 CHECK = "/replay/check"
 _CONSUMED = get_type_hints(Sensed)
 _DECIDED = {name: hint for name, hint in get_type_hints(Cycle).items() if name not in {"sensed", "stage_ns"}}
@@ -50,10 +58,14 @@ class ExactPart:
         for schema in self._consumed.values():
             arrays = [(column, column.flat()) for column in schema.columns.values() if column.values]
             cells += [Cells(f"{schema.entity} {c.name}", _comparable(c, flat), c.ends) for c, flat in arrays]
-            yield schema.entity, [column.finished(flat) for column, flat in arrays]
-        yield CHECK, [_single("crc32", checksums(cells, len(self._lost))), _single("lost_before", self._lost)]
+            yield Batch(schema.entity, [c.finished(flat) for c, flat in arrays if c.kind is not Kind.IMAGE])
+            for column, flat in arrays:
+                if column.kind is Kind.IMAGE:  # no row where there is none: an empty one would blank the viewer
+                    rows = np.flatnonzero(np.diff(column.ends, prepend=0)).tolist()
+                    yield Batch(schema.entity, [column.finished(flat, range(1, len(rows) + 1))], rows)
+        yield Batch(CHECK, [_single("crc32", checksums(cells, len(self._lost))), _single("lost_before", self._lost)])
         for schema in self._decided.values():
-            yield schema.entity, [column.finished(column.flat()) for column in schema.columns.values() if column.values]
+            yield Batch(schema.entity, [c.finished(c.flat()) for c in schema.columns.values() if c.values])
         self._clear()
 
     def _clear(self) -> None:

@@ -8,7 +8,7 @@ from runtime.log import events, plots, scene
 from runtime.log.header import RunHeader
 
 _BACKGROUND = (16, 18, 24)
-_GRID_LINES = (255, 255, 255, 14)
+_CLEARANCE_M = (-0.2, 2.5)  # shown; further away is as good as free
 
 
 def layout(header: RunHeader) -> rrb.Blueprint:
@@ -19,8 +19,10 @@ def layout(header: RunHeader) -> rrb.Blueprint:
             rrb.Vertical(
                 rrb.Horizontal(_depth(), _clearance()),
                 _commands(),
-                rrb.Horizontal(_series("/view/clearance", "clearance [m]"), _series("/timing/stages", "stage times [ms]")),
-                row_shares=[3, 3, 2],
+                rrb.Horizontal(
+                    _series("/view/clearance", "clearance [m]", (-0.2, 2.5)), _series("/timing/stages", "stage times [ms]")
+                ),
+                row_shares=[3, 2.4, 2.6],
             ),
             column_shares=[5, 4],
         ),
@@ -35,11 +37,10 @@ def _scene(header: RunHeader) -> rrb.Spatial3DView:
         name="Scene",
         origin=scene.MAP,
         contents=[f"{scene.MAP}/**", scene.DEPTH, *hidden],
+        spatial_information=rrb.SpatialInformation(target_frame=f"tf#{scene.FOCUS}"),
         background=_BACKGROUND,
-        line_grid=rrb.LineGrid3D(spacing=1.0, color=_GRID_LINES),
-        eye_controls=rrb.EyeControls3D(
-            kind="Orbital", position=(-2.6, -2.2, 2.6), look_target=(1.0, 0.0, 0.2), eye_up=(0, 0, 1), tracking_entity=scene.BASE
-        ),
+        line_grid=False,
+        eye_controls=rrb.EyeControls3D(kind="Orbital", position=(-3.0, -1.3, 2.7), look_target=(0.8, 0.0, 0.1), eye_up=(0, 0, 1)),
         overrides={f"{scene.MAP}/trail": _whole_past()},
     )
 
@@ -50,11 +51,10 @@ def _clearance() -> rrb.Spatial3DView:
         name="Clearance field, from above",
         origin=scene.MAP,
         contents=[*shown, f"{scene.MAP}/movers/**", f"{scene.MAP}/goals", f"{scene.MAP}/trail"],
+        spatial_information=rrb.SpatialInformation(target_frame=f"tf#{scene.FOCUS}"),
         background=_BACKGROUND,
-        line_grid=rrb.LineGrid3D(spacing=1.0, color=_GRID_LINES),
-        eye_controls=rrb.EyeControls3D(
-            kind="Orbital", position=(0.0, -0.01, 6.0), look_target=(0.0, 0.0, 0.0), eye_up=(1, 0, 0), tracking_entity=scene.BASE
-        ),
+        line_grid=False,
+        eye_controls=rrb.EyeControls3D(kind="Orbital", position=(0.0, -0.01, 4.6), look_target=(0.0, 0.0, 0.0), eye_up=(1, 0, 0)),
         overrides={f"{scene.MAP}/trail": _whole_past()},
     )
 
@@ -77,13 +77,18 @@ def _commands() -> rrb.Horizontal:
     return rrb.Horizontal(*(_series(f"/view/command/{axis}", f"{axis} [{units[axis]}]") for axis in plots.AXES))
 
 
-def _series(entity: str, name: str) -> rrb.TimeSeriesView:
-    return rrb.TimeSeriesView(name=name, origin=entity, plot_legend=rrb.PlotLegend("LeftTop"))
+def _series(entity: str, name: str, shown: tuple[float, float] | None = None) -> rrb.TimeSeriesView:
+    axis = rrb.ScalarAxis(range=shown) if shown is not None else None
+    return rrb.TimeSeriesView(name=name, origin=entity, plot_legend=rrb.PlotLegend("LeftTop"), axis_y=axis)
 
 
 def _events() -> rrb.Vertical:
     return rrb.Vertical(
         rrb.StateTimelineView(name="Response", origin=events.RESPONSE),
-        rrb.TextLogView(name="Faults and events", origin=events.EVENTS),
+        rrb.TextLogView(
+            name="Faults and events",
+            origin=events.EVENTS,
+            columns=rrb.TextLogColumns(timeline_columns=["tick"], text_log_columns=["LogLevel", "Body"]),
+        ),
         row_shares=[2, 3],
     )

@@ -11,6 +11,7 @@ from estimators.belief import FREE, OCCUPIED, ClearanceField, Lattice, Occupancy
 
 CLEARANCE_SHOWN_M = 1.5  # the last colour; further away looks the same
 _GRID_Z_M, _CLEARANCE_Z_M = 0.002, 0.004
+_OPACITY = 0.99  # at 1 the viewer would not blend, and paint what is transparent black
 _RGBA8 = rr.components.ImageFormat
 
 
@@ -34,6 +35,7 @@ def _columns(lattices: list[Lattice], pictures: list[NDArray[np.uint32]], z_m: f
         format=[_RGBA8(x.columns, x.rows, color_model="RGBA", channel_datatype="U8") for x in lattices],
         cell_size=[lattice.cell_m for lattice in lattices],
         translation=[(lattice.x_m, lattice.y_m, z_m) for lattice in lattices],
+        opacity=[_OPACITY] * len(lattices),
     )
 
 

@@ -35,12 +35,13 @@ def layers(robot_radius_m: float) -> list[Layer[Any]]:
 
 
 def series(entity: str, names: Sequence[str], palette: Sequence[colours.Rgb] | None = None) -> Rows[Values]:
-    """Return rows of one value per name, plotted as lines."""
+    """Return rows of one value per name, plotted as lines; of a pair the first is drawn wide, so that both can be seen."""
 
     def columns(rows: list[Values]) -> rr.ComponentColumnList:
         return rr.Scalars.columns(scalars=[value for row in rows for value in row]).partition([len(row) for row in rows])
 
-    return Rows(entity, columns, [(entity, rr.SeriesLines(names=list(names), colors=palette))])
+    widths = [3.5, 1.5] if len(names) == 2 else [1.5] * len(names)
+    return Rows(entity, columns, [(entity, rr.SeriesLines(names=list(names), colors=palette, widths=widths))])
 
 
 class Diagnosed:

@@ -20,6 +20,7 @@ from runtime.log.maps import clearance_columns, grid_columns
 from runtime.log.settings import LogSettings
 
 MAP = "/view/map"
+FOCUS = f"{MAP}/focus"  # moves with the robot but does not turn: what the eyes of the layout hang on
 ODOM = f"{MAP}/odom"
 BASE = f"{ODOM}/base"
 CAMERA = f"{BASE}/camera"
@@ -41,6 +42,7 @@ def layers(header: RunHeader, settings: LogSettings) -> list[Layer[Any]]:
     often = round(1e9 / settings.view_rate_hz)
     return [
         Layer(lambda c: c.belief.map_from_odom, Rows(ODOM, _poses), EQUAL),
+        Layer(lambda c: SE2(c.belief.map_from_base.x, c.belief.map_from_base.y), Rows(FOCUS, _poses)),
         Layer(lambda c: c.belief.odom_from_base, Rows(BASE, _poses, shapes.robot(BASE, header))),
         Layer(_camera, Rows(CAMERA, _cameras), EQUAL),
         Layer(_depth_unit, Rows(DEPTH, _depth_scales, _depth_style()), EQUAL),

@@ -16,6 +16,7 @@ from runtime.log.header import RunHeader, SceneShape
 from runtime.log.layers import Layer, Rows, Static
 
 _UNKNOWN_HEIGHT_M = 1.0  # of a moving thing whose shape nobody told
+_SEE_THROUGH = "transparentfillmajorwireframe"
 Placed = tuple[SceneShape, SE2]
 
 
@@ -45,10 +46,15 @@ def solids(entity: str, shapes: Sequence[SceneShape]) -> Static:
     cylinders = [(shape, shape.map_from_shape) for shape in shapes if shape.kind == "cylinder"]
     if boxes:
         colour = [shape.colour for shape, _ in boxes]
-        parts.append((f"{entity}/boxes", rr.Boxes3D(**_boxes(boxes), colors=colour, fill_mode="solid")))
+        parts.append((f"{entity}/boxes", rr.Boxes3D(**_boxes(boxes), colors=colour, fill_mode=_SEE_THROUGH)))
     if cylinders:
         colour = [shape.colour for shape, _ in cylinders]
-        parts.append((f"{entity}/cylinders", rr.Cylinders3D(**_cylinders(cylinders), colors=colour, fill_mode="solid")))
+        parts.append(
+            (
+                f"{entity}/cylinders",
+                rr.Cylinders3D(**_cylinders(cylinders), colors=colour, fill_mode=_SEE_THROUGH),
+            )
+        )
     return parts
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -9,7 +10,7 @@ import rerun as rr
 
 from runtime.cycle import Cycle
 from runtime.log import plots, scene
-from runtime.log.columns import timelines
+from runtime.log.columns import ArrowColumn, timelines
 from runtime.log.events import Events
 from runtime.log.exact import ExactPart
 from runtime.log.header import SCHEMA_VERSION, RunHeader
@@ -79,12 +80,15 @@ class Writer:
     def send(self) -> None:
         """Send the batch and start a new one."""
         index = timelines(self._ticks, self._starts_ns)
-        for entity, columns in self._exact.batches():
-            self._sink.send(entity, index, columns)
+        for batch in self._exact.batches():
+            self._sink.send(batch.entity, index if batch.rows is None else self._index(batch.rows), batch.columns)
         for part in self._drawn:
             part.send(self._sink)
         self._ticks.clear()
         self._starts_ns.clear()
+
+    def _index(self, rows: Sequence[int]) -> list[ArrowColumn]:
+        return timelines([self._ticks[row] for row in rows], [self._starts_ns[row] for row in rows])
 
     def flush(self, timeout_s: float) -> bool:
         """Push what was sent out to the file; return whether that was done in time."""

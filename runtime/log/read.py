@@ -1,0 +1,208 @@
+"""Reads a log back: every value that was recorded, by entity, component and tick, bit for bit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+from rerun.chunk import RrdReader
+
+from drivers.interface.errors import ConfigurationError
+from drivers.interface.sensed import Sensed
+from runtime.log import rvl
+from runtime.log.checksum import Cells, checksums
+from runtime.log.columns import IMAGE_COMPONENT
+from runtime.log.exact import CHECK, consumed_schemas
+from runtime.log.schema import Schema
+from runtime.log.sink import APPLICATION
+
+_NOT_CONTENT = ("/timing", "/run")
+STATIC = -1  # stands for the tick of what holds for the whole run
+_IMAGE = str(IMAGE_COMPONENT.component)
+Cell = NDArray[Any] | list[Any]  # the values of one component at one tick
+History = Mapping[int, Cell]  # by tick
+
+
+@dataclass(frozen=True, slots=True)
+class Log:
+    """What a log holds: cells by entity, component and tick."""
+
+    path: Path
+    entities: Mapping[str, Mapping[str, History]]
+
+    @property
+    def ticks(self) -> list[int]:
+        """Every recorded tick."""
+        return sorted(self.history(CHECK, "crc32"))
+
+    def history(self, entity: str, component: str) -> History:
+        """Return the cells of a component by tick; none if it was never recorded."""
+        return self.entities.get(entity, {}).get(component, {})
+
+    def at(self, entity: str, tick: int) -> dict[str, Cell]:
+        """Return the components of an entity at a tick; an image is decoded, under the name of its column."""
+        found = {name: cells[tick] for name, cells in self.entities.get(entity, {}).items() if tick in cells}
+        if _IMAGE in found:
+            found["depth"] = [rvl.decode(np.asarray(found.pop(_IMAGE)[0]))]
+        return found
+
+
+def read(path: Path, content: str = "/**") -> Log:
+    """Read a log, or only the entities that match `content`.
+
+    Raises:
+        ConfigurationError: the file is missing, empty, cut, or not a log of ours.
+    """
+    require_log(path)
+    entities: dict[str, dict[str, dict[int, Cell]]] = {}
+    for chunk in _chunks(path, content):
+        batch = chunk.to_record_batch()
+        ticks = next((c.to_pylist() for name, c in _columns(batch, b"index") if name == "tick"), [STATIC] * batch.num_rows)
+        for name, column in _columns(batch, b"data"):
+            entities.setdefault(chunk.entity_path, {}).setdefault(name, {}).update(_cells(ticks, column))
+    return Log(path, {entity: _ordered(entities[entity]) for entity in sorted(entities)})
+
+
+def sensed_at(log: Log, tick: int) -> Sensed:
+    """Return what the loop consumed at a tick, as it was.
+
+    Raises:
+        ConfigurationError: the log does not hold all of it.
+    """
+    try:
+        parts = {name: schema.take(log.at(schema.entity, tick)) for name, schema in _schemas().items()}
+    except ValueError as error:
+        raise ConfigurationError(f"tick {tick} of {log.path} cannot be replayed: {error}") from error
+    return Sensed(**parts)
+
+
+def damaged_ticks(log: Log) -> list[int]:
+    """Return the ticks whose checksum does not fit what the log holds of them."""
+    return [tick for tick, crc in log.history(CHECK, "crc32").items() if int(crc[0]) != _checksum(log, tick)]
+
+
+def same_content(first: Path, second: Path) -> str:
+    """Return the first difference between two logs as a sentence; empty when there is none.
+
+    Compared is what was recorded and drawn of the ticks, bit by bit; not how long it took, nor where the logs come from.
+    """
+    one, other = read(first), read(second)
+    found = [
+        _difference(entity, component, one.history(entity, component), other.history(entity, component))
+        for entity, component in sorted(_addresses(one) | _addresses(other))
+        if not entity.startswith(_NOT_CONTENT)
+    ]
+    return min((difference for difference in found if difference is not None), default=(0, ""))[1]
+
+
+def require_log(path: Path) -> None:
+    """Check that a file is a log of ours.
+
+    Raises:
+        ConfigurationError: it is not; says why.
+    """
+    if not path.is_file():
+        raise ConfigurationError(f"there is no log {path}")
+    if path.stat().st_size == 0:
+        raise ConfigurationError(f"the log {path} is empty")
+    with path.open("rb") as file:
+        if not file.read(4).startswith(b"RRF"):
+            raise ConfigurationError(f"{path} is not a Rerun recording")
+    try:
+        applications = {entry.application_id for entry in RrdReader(path).recordings()}
+    except (RuntimeError, ValueError, OSError) as error:
+        raise _damaged(path, error) from error
+    if APPLICATION not in applications:
+        raise ConfigurationError(f"{path} was not recorded by trundle but by {', '.join(sorted(applications)) or 'nobody'}")
+
+
+def _chunks(path: Path, content: str) -> Iterator[Any]:
+    try:
+        yield from RrdReader(path).stream().filter(content=content)
+    except (RuntimeError, ValueError, OSError) as error:
+        raise _damaged(path, error) from error
+
+
+def _damaged(path: Path, error: Exception) -> ConfigurationError:
+    reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+    return ConfigurationError(
+        f"the log {path} is damaged ({reason}); "
+        f"`rerun rrd optimize --continue-on-error {path} -o REPAIRED.rrd` saves what can be read"
+    )
+
+
+def _ordered(components: Mapping[str, History]) -> dict[str, History]:
+    return {name: dict(sorted(components[name].items())) for name in sorted(components)}
+
+
+def _columns(batch: pa.RecordBatch, kind: bytes) -> Iterator[tuple[str, pa.Array]]:
+    for field, column in zip(batch.schema, batch.columns, strict=True):
+        if (field.metadata or {}).get(b"rerun:kind") == kind:
+            yield field.name, column
+
+
+def _cells(ticks: list[int], column: pa.Array) -> Iterator[tuple[int, Cell]]:
+    """Yield each row's values; an empty list is no value."""
+    offsets = column.offsets.to_numpy()
+    flat = column.flatten()  # unlike `values` it respects a slice of the column
+    numbers = pa.types.is_primitive(flat.type) and flat.null_count == 0
+    values = flat.to_numpy(zero_copy_only=False) if numbers else None
+    for row, tick in enumerate(ticks):
+        start, end = int(offsets[row] - offsets[0]), int(offsets[row + 1] - offsets[0])
+        if end > start:
+            yield tick, values[start:end] if values is not None else _listed(flat[start:end])
+
+
+def _listed(flat: pa.Array) -> list[Any]:
+    """Return texts as they are, and bytes or structures in a form that compares bit by bit."""
+    if pa.types.is_list(flat.type) and pa.types.is_uint8(flat.type.value_type):
+        return [item.values.to_numpy() for item in flat]
+    return list(flat.to_pylist())
+
+
+@cache
+def _schemas() -> dict[str, Schema]:
+    return consumed_schemas()
+
+
+def _checksum(log: Log, tick: int) -> int:
+    cells: list[Cells] = []
+    for schema in _schemas().values():
+        row = log.at(schema.entity, tick)
+        cells += [Cells(f"{schema.entity} {name}", row[name], [len(row[name])]) for name in schema.columns if name in row]
+    return checksums(cells, 1)[0]
+
+
+def _addresses(log: Log) -> set[tuple[str, str]]:
+    return {(entity, component) for entity, components in log.entities.items() for component in components}
+
+
+def _difference(entity: str, component: str, one: History, other: History) -> tuple[int, str] | None:
+    for tick in sorted({*one, *other}):
+        a, b = one.get(tick), other.get(tick)
+        if a is None or b is None or not _same(a, b):
+            where = "in what holds for the whole run" if tick == STATIC else f"at tick {tick}"
+            return tick, f"{entity} {component} differs {where}: {_shown(a)} and {_shown(b)}"
+    return None
+
+
+def _same(a: Cell, b: Cell) -> bool:
+    """Compare bit by bit: NaN equals itself, and 0.0 is not -0.0."""
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        return a.dtype == b.dtype and a.tobytes() == b.tobytes()
+    return len(a) == len(b) and all(
+        _same(x, y) if isinstance(x, np.ndarray) and isinstance(y, np.ndarray) else x == y for x, y in zip(a, b, strict=True)
+    )
+
+
+def _shown(cell: Cell | None) -> str:
+    if cell is None:
+        return "nothing"
+    text = np.array2string(cell, threshold=12) if isinstance(cell, np.ndarray) else str(cell)
+    return text if len(text) < 120 else text[:117] + "..."

@@ -1,0 +1,117 @@
+"""Opens a log in the Rerun viewer, or takes a picture of it without a display; never beyond loopback, without analytics."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+
+from rerun.experimental import ViewerClient
+
+from drivers.interface.errors import ConfigurationError
+from runtime.log.exact import CHECK
+from runtime.log.read import read, require_log
+
+WINDOW = "1920x1080"
+_START_TIMEOUT_S = 60.0
+_POLL_S = 0.2
+_SETTLE_S = 6.0  # until the viewer's notices about itself have faded and everything is drawn
+_PACKAGES = "mesa-vulkan-drivers libxkbcommon-x11-0 libxcursor1 libxi6 libxrandr2 libx11-xcb1"
+
+
+def review(log: Path, at_tick: int | None = None, screenshot: Path | None = None, window: str = WINDOW) -> None:
+    """Open a log, at a tick if one is given; with `screenshot`, write a picture of it instead and return.
+
+    Raises:
+        ConfigurationError: the log, the tick or this machine's graphics will not do; says why.
+    """
+    require_log(log)
+    if at_tick is not None:
+        _require_tick(log, at_tick)
+    if screenshot is None and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise ConfigurationError("there is no display to open the viewer on; --screenshot PATH takes a picture without one")
+    with _viewer(log, window, headless=screenshot is not None) as (process, url):
+        if at_tick is not None or screenshot is not None:
+            client = _connect(process, url)
+            if at_tick is not None:
+                client.set_time("tick", sequence=at_tick, play_state="paused")
+            if screenshot is not None:
+                _take(client, screenshot)
+                return
+        process.wait()
+
+
+def _require_tick(log: Path, tick: int) -> None:
+    ticks = read(log, CHECK).ticks
+    if tick not in ticks:
+        span = f"ticks {ticks[0]} to {ticks[-1]}" if ticks else "no tick"
+        raise ConfigurationError(f"--at {tick}: the log {log} holds {span}, not this one")
+
+
+@contextmanager
+def _viewer(log: Path, window: str, *, headless: bool) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
+    """Run a viewer for as long as the block lasts."""
+    port = _free_port()
+    command = [_program(), "--bind", "127.0.0.1", "--port", str(port), "--window-size", window, str(log)]
+    environment = os.environ | {"CI": "1"}  # which is what turns the viewer's analytics off
+    process = subprocess.Popen(
+        [*command, "--headless"] if headless else command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+    )
+    try:
+        yield process, f"rerun+http://127.0.0.1:{port}/proxy"
+    finally:
+        process.kill()  # it holds nothing that a friendlier end would save
+        process.communicate()
+
+
+def _program() -> str:
+    """Return the viewer itself: the `rerun` script would only start it, and could not be ended together with it."""
+    package = find_spec("rerun_cli")
+    if package is None or package.origin is None:
+        raise ConfigurationError("the Rerun viewer is not installed: pip install rerun-sdk")
+    return str(Path(package.origin).with_name("rerun"))
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def _connect(process: subprocess.Popen[bytes], url: str) -> ViewerClient:
+    """Return a connection to the viewer once it shows the whole log."""
+    deadline = time.monotonic() + _START_TIMEOUT_S
+    while time.monotonic() < deadline:
+        if process.poll() is not None:
+            raise _failure(process)
+        try:
+            client = ViewerClient.connect(url)
+            state = client.get_state()
+        except (ConnectionError, RuntimeError):  # not listening yet
+            time.sleep(_POLL_S)
+            continue
+        if state.views and not state.loading:
+            return client
+        time.sleep(_POLL_S)
+    raise ConfigurationError(f"the viewer did not show the log within {_START_TIMEOUT_S:g} s")
+
+
+def _failure(process: subprocess.Popen[bytes]) -> ConfigurationError:
+    said = process.communicate()[1].decode(errors="replace")
+    if any(word in said.lower() for word in ("graphics adapter", "vulkan", "libx", "wgpu", "surface")):
+        return ConfigurationError(f"the viewer finds no graphics; on Debian or Ubuntu: apt-get install {_PACKAGES}")
+    return ConfigurationError(f"the viewer ended: {said.strip().splitlines()[-1] if said.strip() else 'it said nothing'}")
+
+
+def _take(client: ViewerClient, screenshot: Path) -> None:
+    time.sleep(_SETTLE_S)
+    try:
+        screenshot.parent.mkdir(parents=True, exist_ok=True)
+        screenshot.write_bytes(client.take_screenshot())
+    except OSError as error:
+        raise ConfigurationError(f"--screenshot {screenshot} cannot be written: {error.strerror}") from error
