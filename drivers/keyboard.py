@@ -73,6 +73,7 @@ class KeyboardOperator:
         self.close()
         self._fault = ""
         self._sequence = 0
+        self._ring = SampleRing(256)  # what was typed before it was closed is over
         self._enabled, self._paused = self._settings.enabled, False
         descriptor = self._terminal()
         self._saved = termios.tcgetattr(descriptor)
@@ -97,8 +98,8 @@ class KeyboardOperator:
         self._thread = self._wake = self._saved = None
 
     def drain(self) -> tuple[OperatorEvent, ...]:
-        """Return every action since the last call, oldest first."""
-        return self._ring.drain()
+        """Return every action since the last call, oldest first; none when closed."""
+        return () if self._thread is None else self._ring.drain()
 
     def health(self) -> DeviceHealth:
         """Say how it stands; the terminal's end is a fault, since the person is then out of reach."""
