@@ -5,11 +5,13 @@ from __future__ import annotations
 import enum
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import rerun as rr
+from numpy.typing import NDArray
 
 from runtime.log import rvl
 
@@ -61,20 +63,42 @@ class Column:
         """Return the values of all ticks.
 
         Raises:
-            pyarrow.ArrowInvalid, pyarrow.ArrowTypeError: a value is not what the column holds.
+            pyarrow.ArrowInvalid, pyarrow.ArrowTypeError, TypeError: a value is not what the column holds.
         """
+        if self.kind is Kind.INT:
+            return pa.array(self._integers(), self.kind.value)
         if self.kind is Kind.IMAGE:
             return pa.array([rvl.encode(image) for image in self.values], self.kind.value)
         return pa.array(self.values, self.kind.value)
 
+    def _integers(self) -> NDArray[np.int64]:
+        integers = np.array(self.values) if self.values else np.zeros(0, np.int64)
+        if integers.dtype != np.int64:  # Arrow would cut 1.5 to 1
+            raise TypeError(f"{self.name} holds whole numbers, not {self.values}")
+        return integers
+
     def finished(self, flat: pa.Array, ends: Sequence[int] | None = None) -> ArrowColumn:
         """Return one list of values per tick, or per row that ends where told."""
         descriptor = IMAGE_COMPONENT if self.kind is Kind.IMAGE else rr.ComponentDescriptor(self.name)
-        offsets = pa.array(np.array([0, *(self.ends if ends is None else ends)], np.int32))
-        return ArrowColumn(descriptor, pa.ListArray.from_arrays(offsets, flat))
+        return ArrowColumn(descriptor, pa.ListArray.from_arrays(offsets_of(self.ends if ends is None else ends), flat))
 
 
-def timelines(ticks: Sequence[int], starts_ns: Sequence[int]) -> list[ArrowColumn]:
+def offsets_of(ends: Sequence[int]) -> pa.Array:
+    """Return where each list begins, and where the last one ends; most columns hold one value a tick and share these."""
+    return _ones(len(ends)) if len(ends) == ends[-1] and ends == list(range(1, len(ends) + 1)) else _offsets(ends)
+
+
+@cache
+def _ones(count: int) -> pa.Array:
+    return _offsets(range(1, count + 1))
+
+
+def _offsets(ends: Sequence[int]) -> pa.Array:
+    return pa.array(np.array([0, *ends], np.int32))
+
+
+@lru_cache(maxsize=16)
+def timelines(ticks: tuple[int, ...], starts_ns: tuple[int, ...]) -> tuple[ArrowColumn, ArrowColumn]:
     """Return the two timelines of a batch: `tick`, and `mono`, the grid time of the tick [ns]."""
     mono = pa.array(starts_ns, pa.int64()).cast(pa.duration("ns"))
-    return [ArrowColumn("tick", pa.array(ticks, pa.int64())), ArrowColumn("mono", mono)]
+    return ArrowColumn("tick", pa.array(ticks, pa.int64())), ArrowColumn("mono", mono)

@@ -62,7 +62,7 @@ class ExactPart:
             for column, flat in arrays:
                 if column.kind is Kind.IMAGE:  # no row where there is none: an empty one would blank the viewer
                     rows = np.flatnonzero(np.diff(column.ends, prepend=0)).tolist()
-                    yield Batch(schema.entity, [column.finished(flat, range(1, len(rows) + 1))], rows)
+                    yield Batch(schema.entity, [column.finished(flat, list(range(1, len(rows) + 1)))], rows)
         yield Batch(CHECK, [_single("crc32", checksums(cells, len(self._lost))), _single("lost_before", self._lost)])
         for schema in self._decided.values():
             yield Batch(schema.entity, [c.finished(c.flat()) for c in schema.columns.values() if c.values])

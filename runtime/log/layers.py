@@ -11,7 +11,7 @@ import rerun as rr
 
 from drivers.interface.sensed import Tick
 from runtime.cycle import Cycle
-from runtime.log.columns import timelines
+from runtime.log.columns import ArrowColumn, timelines
 from runtime.log.sink import Sink
 
 T = TypeVar("T")
@@ -23,7 +23,7 @@ class Rows(Generic[T]):
     """The items of one entity since the last batch, and how they become columns."""
 
     entity: str
-    build: Callable[[list[T]], Iterable[rr.ComponentColumn]]
+    build: Callable[[list[T]], Iterable[rr.ComponentColumn | ArrowColumn]]
     static: Static = ()  # logged once, before the first row
     _announced: bool = False
     _ticks: list[int] = field(default_factory=list)
@@ -44,7 +44,7 @@ class Rows(Generic[T]):
             self._announced = True
             for entity, archetype in self.static:
                 sink.log_static(entity, archetype)
-        sink.send(self.entity, timelines(self._ticks, self._starts_ns), self.build(self._items))
+        sink.send(self.entity, timelines(tuple(self._ticks), tuple(self._starts_ns)), self.build(self._items))
         self._ticks.clear()
         self._starts_ns.clear()
         self._items.clear()

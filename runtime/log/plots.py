@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import accumulate
 from typing import Any
 
+import pyarrow as pa
 import rerun as rr
 
 from drivers.interface.commands import Command
@@ -12,6 +14,7 @@ from estimators.belief import Belief
 from planners.planner import Diagnostics
 from runtime.cycle import STAGES, Cycle
 from runtime.log import colours
+from runtime.log.columns import ArrowColumn, offsets_of
 from runtime.log.layers import Layer, Rows
 from runtime.log.nodes import said
 from runtime.log.sink import Sink
@@ -19,6 +22,7 @@ from runtime.log.sink import Sink
 AXES = ("vx", "vy", "wz")
 NAN = float("nan")
 Values = tuple[float, ...]
+_SCALARS = next(iter(rr.Scalars.columns(scalars=[0.0]))).component_descriptor()
 
 
 def layers(robot_radius_m: float) -> list[Layer[Any]]:
@@ -37,8 +41,10 @@ def layers(robot_radius_m: float) -> list[Layer[Any]]:
 def series(entity: str, names: Sequence[str], palette: Sequence[colours.Rgb] | None = None) -> Rows[Values]:
     """Return rows of one value per name, plotted as lines; of a pair the first is drawn wide, so that both can be seen."""
 
-    def columns(rows: list[Values]) -> rr.ComponentColumnList:
-        return rr.Scalars.columns(scalars=[value for row in rows for value in row]).partition([len(row) for row in rows])
+    def columns(rows: list[Values]) -> list[ArrowColumn]:
+        flat = pa.array([value for row in rows for value in row], pa.float64())
+        ends = list(accumulate(len(row) for row in rows))
+        return [ArrowColumn(_SCALARS, pa.ListArray.from_arrays(offsets_of(ends), flat))]
 
     widths = [3.5, 1.5] if len(names) == 2 else [1.5] * len(names)
     return Rows(entity, columns, [(entity, rr.SeriesLines(names=list(names), colors=palette, widths=widths))])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -12,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 from rerun.chunk import RrdReader
+from rerun.error_utils import RerunWarning
 
 from drivers.interface.errors import ConfigurationError
 from drivers.interface.sensed import Sensed
@@ -115,7 +117,7 @@ def require_log(path: Path) -> None:
         if not file.read(4).startswith(b"RRF"):
             raise ConfigurationError(f"{path} is not a Rerun recording")
     try:
-        applications = {entry.application_id for entry in RrdReader(path).recordings()}
+        applications = {entry.application_id for entry in _reader(path).recordings()}
     except (RuntimeError, ValueError, OSError) as error:
         raise _damaged(path, error) from error
     if APPLICATION not in applications:
@@ -124,9 +126,14 @@ def require_log(path: Path) -> None:
 
 def _chunks(path: Path, content: str) -> Iterator[Any]:
     try:
-        yield from RrdReader(path).stream().filter(content=content)
+        yield from _reader(path).stream().filter(content=content)
     except (RuntimeError, ValueError, OSError) as error:
         raise _damaged(path, error) from error
+
+
+def _reader(path: Path) -> RrdReader:
+    with warnings.catch_warnings(action="ignore", category=RerunWarning):  # a killed process leaves no footer: readable
+        return RrdReader(path)
 
 
 def _damaged(path: Path, error: Exception) -> ConfigurationError:

@@ -123,7 +123,7 @@ class Recorder:
 
     def _ticks_due(self, cycle: Cycle) -> int:
         """Return after how many ticks to wake the writer: right after a tick's work is the best time for it to run."""
-        in_interval = int(self._settings.flush_interval_s * 1e9) // cycle.sensed.tick.period_ns - 1
+        in_interval = int(self._settings.flush_interval_s * 1e9) // cycle.sensed.tick.period_ns
         most = min(self._settings.batch_ticks, self._settings.queue_ticks)
         self._due = most if self._lockstep else max(1, min(most, in_interval))
         return self._due
@@ -134,9 +134,10 @@ class Recorder:
         try:
             while self._write_batch(self._writer):
                 pass
-            self._writer.close(_CLOSE_TIMEOUT_S)
+            self._writer.send_drawn()
         except Exception as error:  # noqa: BLE001
             self._fail(f"the log {self._path} cannot be written: {error}")
+        finally:
             self._writer.close(_CLOSE_TIMEOUT_S)
 
     def _write_batch(self, writer: Writer) -> bool:
@@ -148,8 +149,7 @@ class Recorder:
             self._changed.notify_all()
         for entry in entries:
             writer.put(entry.cycle, drawn=entry.drawn, lost_before=entry.lost_before)
-        if entries:
-            writer.send()
+        writer.send()
         while not writer.flush(self._settings.flush_interval_s) and not self._closing:
             pass  # the disk is stalled: what comes meanwhile waits in our queue, which is bounded, and not in Rerun, which is not
         if writer.fault:

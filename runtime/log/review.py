@@ -8,7 +8,6 @@ import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.util import find_spec
 from pathlib import Path
 
 from rerun.experimental import ViewerClient
@@ -16,6 +15,7 @@ from rerun.experimental import ViewerClient
 from drivers.interface.errors import ConfigurationError
 from runtime.log.exact import CHECK
 from runtime.log.read import read, require_log
+from runtime.log.repair import quiet_environment, rerun_program
 
 WINDOW = "1920x1080"
 _START_TIMEOUT_S = 60.0
@@ -57,24 +57,18 @@ def _require_tick(log: Path, tick: int) -> None:
 def _viewer(log: Path, window: str, *, headless: bool) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
     """Run a viewer for as long as the block lasts."""
     port = _free_port()
-    command = [_program(), "--bind", "127.0.0.1", "--port", str(port), "--window-size", window, str(log)]
-    environment = os.environ | {"CI": "1"}  # which is what turns the viewer's analytics off
+    command = [rerun_program(), "--bind", "127.0.0.1", "--port", str(port), "--window-size", window, str(log)]
     process = subprocess.Popen(
-        [*command, "--headless"] if headless else command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+        [*command, "--headless"] if headless else command,
+        env=quiet_environment(),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
     )
     try:
         yield process, f"rerun+http://127.0.0.1:{port}/proxy"
     finally:
         process.kill()  # it holds nothing that a friendlier end would save
         process.communicate()
-
-
-def _program() -> str:
-    """Return the viewer itself: the `rerun` script would only start it, and could not be ended together with it."""
-    package = find_spec("rerun_cli")
-    if package is None or package.origin is None:
-        raise ConfigurationError("the Rerun viewer is not installed: pip install rerun-sdk")
-    return str(Path(package.origin).with_name("rerun"))
 
 
 def _free_port() -> int:

@@ -11,6 +11,7 @@ class LogSettings(Settings):
     queue_ticks: int = Field(100, ge=2, le=10_000, description="ticks that may wait for the writer")
     batch_ticks: int = Field(25, ge=1, le=1_000, description="ticks sent as one column batch, if the flush interval allows")
     flush_interval_s: float = Field(0.2, gt=0.0, le=10.0, description="what a killed process loses at most, in real time")
+    draw_interval_s: float = Field(1.0, gt=0.0, le=60.0, description="the same of what is only drawn; live: flush_interval_s")
     depth: bool = Field(True, description="record depth images; without them a log cannot be replayed")
     view_rate_hz: float = Field(5.0, gt=0.0, le=200.0, description="most that grid, clearance and paths are drawn per second")
     live_port: int = Field(9876, ge=1024, le=65_535, description="loopback port of the live view")

@@ -52,6 +52,8 @@ class Writer:
             plots.Diagnosed("/view/shield", plots.shield_diagnostics),
             Events(),
         )
+        self._draw_interval_ns = round(1e9 * (settings.draw_interval_s if live_port is None else settings.flush_interval_s))
+        self._draw_due_ns = 0
         self._ticks: list[int] = []
         self._starts_ns: list[int] = []
         self._sink.log_static(RUN, _provenance(header, settings))
@@ -78,17 +80,25 @@ class Writer:
                 part.put(cycle)
 
     def send(self) -> None:
-        """Send the batch and start a new one."""
-        index = timelines(self._ticks, self._starts_ns)
-        for batch in self._exact.batches():
-            self._sink.send(batch.entity, index if batch.rows is None else self._index(batch.rows), batch.columns)
-        for part in self._drawn:
-            part.send(self._sink)
+        """Send the batch and start a new one; what is drawn goes out less often, as a batch costs much and a row little."""
+        if not self._ticks:
+            return
+        for batch in tuple(self._exact.batches()):  # built as a whole before any of it is sent
+            self._sink.send(batch.entity, self._index(batch.rows or range(len(self._ticks))), batch.columns)
+        now_ns = self._starts_ns[-1]
         self._ticks.clear()
         self._starts_ns.clear()
+        if now_ns >= self._draw_due_ns:
+            self._draw_due_ns = now_ns + self._draw_interval_ns
+            self.send_drawn()
 
-    def _index(self, rows: Sequence[int]) -> list[ArrowColumn]:
-        return timelines([self._ticks[row] for row in rows], [self._starts_ns[row] for row in rows])
+    def send_drawn(self) -> None:
+        """Send what waits to be drawn."""
+        for part in self._drawn:
+            part.send(self._sink)
+
+    def _index(self, rows: Sequence[int]) -> tuple[ArrowColumn, ArrowColumn]:
+        return timelines(tuple(self._ticks[row] for row in rows), tuple(self._starts_ns[row] for row in rows))
 
     def flush(self, timeout_s: float) -> bool:
         """Push what was sent out to the file; return whether that was done in time."""

@@ -1,7 +1,8 @@
 """Cycles as a loop would make them: a robot drives down a corridor towards a walker, with everything a log can hold."""
 
 import math
-from dataclasses import dataclass
+import struct
+from dataclasses import dataclass, fields, is_dataclass
 
 import numpy as np
 
@@ -155,3 +156,14 @@ def _cycle(index: int, count: int, sensed: Sensed, before: Cycle | None) -> Cycl
     )
     stages = tuple(round(1e6 * x) for x in (0.4, 2.0, 0.3, 1.5 + 0.3 * math.sin(t), 0.2, 0.1, 0.02))
     return Cycle(sensed, belief, route, plan, verdict, stages)
+
+
+def bits(value: object) -> object:
+    """The value in a form whose equality is that of every bit: NaN equals itself, 0.0 is not -0.0."""
+    if is_dataclass(value):
+        return (type(value).__name__, [(f.name, bits(getattr(value, f.name))) for f in fields(value)])
+    if isinstance(value, np.ndarray):
+        return (value.dtype.str, value.shape, value.tobytes())
+    if isinstance(value, tuple):
+        return tuple(bits(item) for item in value)
+    return struct.pack("<d", value) if isinstance(value, float) else value
