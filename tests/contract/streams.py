@@ -23,6 +23,8 @@ from runtime.registry import Part, load
 from runtime.robot import Devices, Robot
 from sim_drivers.scene import Mover, Scene, Shape, StaticObstacle
 from sim_drivers.world import MujocoWorld, WorldSettings
+from tests.contract.facts import arrays
+from tests.planners.synthetic import Disc, belief_of
 
 BASES = {"omni": "sim_omni", "differential": "sim_skid_steer"}
 PERIOD_NS, TICKS = 50_000_000, 50
@@ -85,22 +87,41 @@ def stream(base: str) -> Stream:
 
 @cache
 def beliefs(base: str) -> tuple[Belief, ...]:
-    """What the standard estimator makes of it, and at the end what no planner likes: nothing known, walled in, off the grid."""
+    """What the standard estimator makes of it, and then situations in which a part's memory matters, or that none likes."""
     driven = stream(base)
     estimator = StandardEstimator(StandardSettings(), driven.estimator_setup)
     believed = [estimator.update(sensed) for sensed in driven.sensed]
     last = believed[-1]
-    lost = replace(last, odom_from_base=SE2(100.0, -100.0, 3.0))
-    return (*believed, _everywhere(last, UNKNOWN), _everywhere(last, OCCUPIED), lost, *believed[-5:])
+    no_good = (_everywhere(last, UNKNOWN), _everywhere(last, OCCUPIED), replace(last, odom_from_base=SE2(100.0, -100.0, 3.0)))
+    situations = [*_dilemma(), *_stuck(), *no_good, *believed[-5:]]
+    return (*believed, *(replace(b, tick=TICKS + i, stamp_ns=(TICKS + i) * PERIOD_NS) for i, b in enumerate(situations)))
+
+
+def _dilemma() -> list[Belief]:
+    """A pillar on the straight line to the goal, first a little to one side of it, then to the other: which way round?"""
+    one, other = (belief_of([Disc(1.45, y, 0.3)]) for y in (0.27, 0.21))
+    return [_read_only(one)] * 4 + [_read_only(other)] * 4
+
+
+def _stuck() -> list[Belief]:
+    """Facing the goal, it knows nothing but the ground that it stands on, for longer than anybody should wait."""
+    facing = SE2(0.0, 0.0, math.atan2(MISSION.goals[0].y_m, MISSION.goals[0].x_m))
+    return [_read_only(belief_of([], facing, seen_m=0.15))] * 45
+
+
+def _read_only(belief: Belief) -> Belief:
+    for array in arrays(belief):
+        frozen_array(array)
+    return belief
 
 
 @cache
 def routes(base: str) -> tuple[Route, ...]:
-    """The grid router's route at each belief, but none at every seventh."""
+    """The grid router's route at each belief, but none at every seventh of the drive."""
     router = GridRouter(GridRouter.Settings(), RouterSetup(PERIOD_S, RADIUS_M))
     found = [router.route(belief, MISSION) for belief in beliefs(base)]
     nowhere = replace(found[0], path_in_odom=np.zeros((0, 2)), length_m=0.0, blocked=True)
-    return tuple(nowhere if index % 7 == 6 else route for index, route in enumerate(found))
+    return tuple(nowhere if index % 7 == 6 and index < TICKS else route for index, route in enumerate(found))
 
 
 def _everywhere(belief: Belief, label: int) -> Belief:

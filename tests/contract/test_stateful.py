@@ -36,8 +36,9 @@ def test_same_inputs_give_the_same_answers_to_the_bit(subject):
     assert facts(subject.answers(warm, subject.inputs)) == facts(subject.answers(cold, subject.inputs))
 
 
-@pytest.mark.parametrize("at", [0, 1, 23, 51])
+@pytest.mark.parametrize("at", [1, 23, 56, 95])  # the last two: torn between two ways; stuck and looking around
 def test_a_restored_one_continues_identically(subject, at):
+    at %= len(subject.inputs)
     before, after = subject.inputs[:at], subject.inputs[at:]
     first, second = subject.build(), subject.build()
     subject.answers(first, before)
