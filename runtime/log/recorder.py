@@ -150,12 +150,12 @@ class Recorder:
         for entry in entries:
             writer.put(entry.cycle, drawn=entry.drawn, lost_before=entry.lost_before)
         writer.send()
-        while not writer.flush(self._settings.flush_interval_s) and not self._closing:
+        while not (flushed := writer.flush(self._settings.flush_interval_s)) and not self._closing:
             pass  # the disk is stalled: what comes meanwhile waits in our queue, which is bounded, and not in Rerun, which is not
         if writer.fault:
             self._fail(writer.fault)
             return not self._closing
-        self._written_ticks += len(entries)
+        self._written_ticks += len(entries) if flushed else 0
         return bool(self._queue) or not self._closing
 
     def _fail(self, sentence: str) -> None:

@@ -8,6 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from drivers.interface.errors import ConfigurationError
+from runtime.log.read import require_log
 
 
 def rerun_program() -> str:
@@ -36,6 +37,9 @@ def repair(damaged: Path, repaired: Path) -> None:
     if repaired.exists():
         raise ConfigurationError(f"{repaired} exists already; nothing is overwritten")
     command = [rerun_program(), "rrd", "optimize", "--continue-on-error", str(damaged), "-o", str(repaired)]
-    done = subprocess.run(command, env=quiet_environment(), capture_output=True, text=True, check=False)
-    if done.returncode != 0 or not repaired.exists():
-        raise ConfigurationError(f"nothing of {damaged} can be saved: {(done.stderr.strip().splitlines() or ['no reason'])[-1]}")
+    subprocess.run(command, env=quiet_environment(), capture_output=True, check=False)
+    try:
+        require_log(repaired)
+    except ConfigurationError as error:
+        repaired.unlink(missing_ok=True)
+        raise ConfigurationError(f"nothing of {damaged} can be saved") from error

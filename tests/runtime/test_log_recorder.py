@@ -1,5 +1,6 @@
 import os
 import signal
+import socket
 import subprocess
 import sys
 from dataclasses import replace
@@ -149,6 +150,39 @@ def test_a_value_that_cannot_be_recorded_is_a_fault_and_what_came_before_is_kept
     assert report.written_ticks == 30
     assert report.dropped_ticks > 0
     assert read(tmp_path / "a.rrd").ticks == list(range(30))
+
+
+def test_a_stalled_disk_costs_ticks_but_no_memory_and_no_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("runtime.log.recorder._CLOSE_TIMEOUT_S", 0.2)
+    path = tmp_path / "a.rrd"
+    os.mkfifo(path)
+    reader = os.open(path, os.O_RDONLY | os.O_NONBLOCK)  # someone holds the other end and never reads
+    recorder = Recorder(path, LogSettings(flush_interval_s=0.05, queue_ticks=10), header(), lockstep=False)
+    recorder.open()
+    for cycle in CYCLES * 20:
+        recorder.record(cycle)
+        with recorder._changed:
+            recorder._changed.wait(0.001)  # as a loop that sleeps
+    report = recorder.close()
+    assert report.fault == f"the log {path} is incomplete: its disk is stalled"
+    assert report.queue_high_water == 10
+    assert report.dropped_ticks > 0
+    os.close(reader)
+
+
+def test_the_live_view_needs_no_file_and_a_free_port(tmp_path: Path) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        recorder = Recorder(None, LogSettings(live_port=port), header(), lockstep=True, live=True)
+        with pytest.raises(ConfigurationError, match=f"log.live_port {port} is taken"):
+            recorder.open()
+        assert recorder.close() == RecorderReport()
+    free = Recorder(None, LogSettings(live_port=port), header(), lockstep=True, live=True)
+    free.open()
+    free.record(CYCLES[0])
+    assert free.close() == RecorderReport(written_ticks=1, queue_high_water=1)
 
 
 RECORD_UNTIL_KILLED = """

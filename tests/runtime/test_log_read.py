@@ -1,0 +1,104 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rerun as rr
+
+from drivers.interface.errors import ConfigurationError
+from runtime.log.read import damaged_ticks, read
+from runtime.log.repair import repair
+from runtime.log.review import review
+from tests.runtime.log_cycles import bits, make_cycles
+from tests.runtime.test_log_recorder import record
+
+CYCLES = make_cycles(12)
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("log") / "a.rrd"
+    record(path, CYCLES)
+    return path
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_flipped_bit_is_an_error_or_named_but_never_silently_other_data(log: Path, tmp_path: Path, seed: int) -> None:
+    content = bytearray(log.read_bytes())
+    at = int(np.random.default_rng(seed).integers(len(content) // 4, len(content)))
+    content[at] ^= 1 << seed % 8
+    (tmp_path / "b.rrd").write_bytes(content)
+    try:
+        found = read(tmp_path / "b.rrd", "/replay/**")
+        damaged = damaged_ticks(found)
+    except ConfigurationError:
+        return
+    good = read(log, "/replay/**")
+    for tick in set(found.ticks) - set(damaged):
+        for entity in good.entities:
+            if entity.startswith("/replay/sensed"):
+                assert cells(found, entity, tick) == cells(good, entity, tick)
+
+
+def cells(log, entity: str, tick: int) -> object:  # type: ignore[no-untyped-def]
+    return {name: bits(tuple(values)) for name, values in log.at(entity, tick).items() if ":" not in name}
+
+
+def foreign(path: Path) -> None:
+    with rr.RecordingStream("somebody_else") as stream:
+        stream.save(path)
+        stream.log("a", rr.Scalars(1.0))
+        stream.disconnect()
+
+
+@pytest.mark.parametrize("use", [read, review])
+def test_what_is_no_log_of_ours_is_refused_with_one_sentence(tmp_path: Path, use) -> None:  # type: ignore[no-untyped-def]
+    empty, text, other = tmp_path / "empty.rrd", tmp_path / "text.rrd", tmp_path / "other.rrd"
+    empty.touch()
+    text.write_text("not a recording")
+    foreign(other)
+    expected = {
+        tmp_path / "none.rrd": f"there is no log {tmp_path / 'none.rrd'}",
+        tmp_path: f"there is no log {tmp_path}",
+        empty: f"the log {empty} is empty",
+        text: f"{text} is not a Rerun recording",
+        other: f"{other} was not recorded by trundle but by somebody_else",
+    }
+    for path, sentence in expected.items():
+        with pytest.raises(ConfigurationError) as caught:
+            use(path)
+        assert str(caught.value) == sentence
+
+
+def test_a_tick_that_was_not_recorded_is_refused_with_those_that_were(log: Path) -> None:
+    with pytest.raises(ConfigurationError, match=r"--at 99: the log .* holds ticks 0 to 11, not this one"):
+        review(log, at_tick=99)
+
+
+def test_without_a_display_a_picture_is_offered(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with pytest.raises(ConfigurationError, match="no display to open the viewer on; --screenshot PATH"):
+        review(log)
+
+
+def test_a_repair_never_overwrites_and_says_when_nothing_is_left(log: Path, tmp_path: Path) -> None:
+    with pytest.raises(ConfigurationError, match="exists already"):
+        repair(log, log)
+    (tmp_path / "text.rrd").write_text("not a recording")
+    with pytest.raises(ConfigurationError, match=r"nothing of .* can be saved"):
+        repair(tmp_path / "text.rrd", tmp_path / "b.rrd")
+
+
+def test_every_view_of_the_layout_finds_what_it_shows(log: Path) -> None:
+    """The origins of the embedded layout's views are entities of the log."""
+    from rerun.chunk import RrdReader
+
+    reader = RrdReader(log)
+    entities = set(read(log).entities)
+    origins = set()
+    for chunk in reader.stream(store=reader.blueprints()[0]):
+        batch = chunk.to_record_batch()
+        if "ViewBlueprint:space_origin" in batch.schema.names:
+            origins |= {cell[0] for cell in batch.column("ViewBlueprint:space_origin").to_pylist()}
+    assert len(origins) >= 9
+    assert origins <= entities
