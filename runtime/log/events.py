@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import rerun as rr
 
+from drivers.interface.samples import EmergencyStop, Jog, NewGoal, OperatorAction, ResetFaults, SetEnabled, SetPaused
 from runtime.cycle import Cycle
 from runtime.faults import FaultReport, Response
 from runtime.log import colours
@@ -44,14 +45,14 @@ class Events:
         """Write what is new."""
         tick, verdict = cycle.sensed.tick, cycle.verdict
         for event in cycle.sensed.operator:
-            self._text.add(tick, Event(rr.TextLogLevel.INFO, f"operator: {event.action}"))
+            self._text.add(tick, Event(rr.TextLogLevel.INFO, f"operator: {_action(event.action)}"))
         faults = {(report.fault.value, report.device): report for report in verdict.faults}
         for key, report in faults.items():
             if key not in self._faults:
                 self._text.add(tick, Event(_LEVELS[report.response], _sentence(report)))
         for key, report in self._faults.items():
             if key not in faults:
-                self._text.add(tick, Event(rr.TextLogLevel.INFO, f"over: {report.fault.value} {report.device}".rstrip()))
+                self._text.add(tick, Event(rr.TextLogLevel.INFO, f"over: {_name(report)}"))
         self._faults = faults
         if verdict.response is not self._response:
             self._response = verdict.response
@@ -65,8 +66,27 @@ class Events:
 
 
 def _sentence(report: FaultReport) -> str:
-    where = f" of {report.device}" if report.device else ""
-    return f"fault: {report.fault.value}{where}" + (f": {report.detail}" if report.detail else "")
+    return f"fault: {_name(report)}" + (f": {report.detail}" if report.detail else "")
+
+
+def _name(report: FaultReport) -> str:
+    return report.fault.value + (f" of {report.device}" if report.device else "")
+
+
+def _action(action: OperatorAction) -> str:
+    match action:
+        case SetEnabled(enabled):
+            return "gives the permission to move" if enabled else "takes the permission to move"
+        case SetPaused(paused):
+            return "pauses" if paused else "resumes"
+        case Jog(twist):
+            return f"jog {twist.vx:g} m/s, {twist.vy:g} m/s, {twist.wz:g} rad/s"
+        case NewGoal(goal):
+            return f"new goal at {goal.x_m:g} m, {goal.y_m:g} m"
+        case EmergencyStop():
+            return "emergency stop"
+        case ResetFaults():
+            return "resets the faults"
 
 
 def _texts(events: list[Event]) -> rr.ComponentColumnList:

@@ -5,17 +5,9 @@ The idea is record shredding (Melnik et al., "Dremel", VLDB 2010), with explicit
 
 from __future__ import annotations
 
-import enum
-import math
-import zlib
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import fields
-from itertools import islice
 from operator import attrgetter
 from typing import Any, Protocol
-
-import numpy as np
-from numpy.typing import NDArray
 
 from runtime.log.columns import Column
 
@@ -34,35 +26,6 @@ class Node(Protocol):
     def take(self, row: Row) -> Any:
         """Return the next value.  Raises StopIteration when the row holds none."""
         ...
-
-
-class Scalar:
-    """An int, a float, a bool or a str: one cell."""
-
-    def __init__(self, column: Column, kind: type) -> None:
-        """Write to the column, read back as `kind`."""
-        self._name, self._kind = column.name, kind
-        self.put: Put = column.values.append
-
-    def take(self, row: Row) -> Any:
-        """Return the next value."""
-        return self._kind(next(row[self._name]))
-
-
-class Enumeration:
-    """A member of an enum, by its name."""
-
-    def __init__(self, column: Column, kind: type[enum.Enum]) -> None:
-        """Write to the column, read back as a member of `kind`."""
-        self._name, self._kind, self._append = column.name, kind, column.values.append
-
-    def put(self, value: enum.Enum) -> None:
-        """Write the member's name."""
-        self._append(value.name)
-
-    def take(self, row: Row) -> enum.Enum:
-        """Return the member."""
-        return self._kind[next(row[self._name])]
 
 
 class Record:
@@ -170,86 +133,3 @@ class Choice:
     def take(self, row: Row) -> Any:
         """Return the value."""
         return self._children[next(row[self._name])].take(row)
-
-
-class Array:
-    """A float64 array: the number of its axes and its shape, then its elements."""
-
-    def __init__(self, shape: Column, elements: Column) -> None:
-        """Write to the two columns."""
-        self._shape, self._elements = shape, elements
-
-    def put(self, value: NDArray[np.float64]) -> None:
-        """Write the array."""
-        self._shape.values.append(value.ndim)
-        self._shape.values.extend(value.shape)
-        self._elements.values.extend(value.ravel().tolist())
-
-    def take(self, row: Row) -> NDArray[np.float64]:
-        """Return the array."""
-        shape = tuple(islice(row[self._shape.name], next(row[self._shape.name])))
-        elements = list(islice(row[self._elements.name], math.prod(shape)))
-        return np.array(elements, np.float64).reshape(shape)
-
-
-class Image:
-    """A 16-bit image: one cell; nothing where the settings leave images out."""
-
-    def __init__(self, column: Column, recorded: bool) -> None:
-        """Write to the column if `recorded`."""
-        self._name = column.name
-        self.put: Put = column.values.append if recorded else lambda image: None
-
-    def take(self, row: Row) -> NDArray[np.uint16]:
-        """Return the image, shape (height, width)."""
-        return np.asarray(next(row[self._name]), np.uint16)
-
-
-class Digest:
-    """A large array that follows from what was sensed: only its CRC-32, enough to find the tick where two runs part."""
-
-    def __init__(self, column: Column) -> None:
-        """Write the CRC to the column."""
-        self._name, self._append = column.name, column.values.append
-        self._last: NDArray[Any] | None = None
-        self._crc = 0
-
-    def put(self, value: NDArray[Any]) -> None:
-        """Write the CRC; the very array of the tick before is not read again."""
-        if value is not self._last:
-            self._last, self._crc = value, zlib.crc32(np.ascontiguousarray(value).data)
-        self._append(self._crc)
-
-    def take(self, row: Row) -> Any:
-        """Raise TypeError: a CRC cannot be turned back."""
-        raise TypeError(f"the log holds only a checksum of {self._name}")
-
-
-class Said:
-    """Diagnostics, whose fields a planner or shield defines: numbers and flags as float64, all else as text."""
-
-    def __init__(self, name: Column, new_column: Callable[[str, type], Column]) -> None:
-        """Write the class name to `name`; the columns of its fields follow when a field is first met."""
-        self._name = name
-        self._new_column = new_column
-        self._columns: dict[tuple[str, type], Column] = {}
-
-    def put(self, value: Any) -> None:
-        """Write every field."""
-        self._name.values.append(type(value).__name__)
-        for name, part in said(value):
-            key = (name, type(part))
-            if key not in self._columns:
-                self._columns[key] = self._new_column(*key)
-            self._columns[key].values.append(part)
-
-    def take(self, row: Row) -> Any:
-        """Raise TypeError: their class may not be installed where the log is read."""
-        raise TypeError(f"the log holds {self._name.name} for comparison only")
-
-
-def said(diagnostics: Any) -> Iterator[tuple[str, float | str]]:
-    """Yield the fields of diagnostics by name, as float where they are numbers or flags, else as text."""
-    for name in (field.name for field in fields(diagnostics)):
-        value = getattr(diagnostics, name)
-        yield name, float(value) if isinstance(value, int | float | np.number | np.bool_) else str(value)

@@ -16,7 +16,7 @@ from runtime.cycle import STAGES, Cycle
 from runtime.log import colours
 from runtime.log.columns import ArrowColumn, offsets_of
 from runtime.log.layers import Layer, Rows
-from runtime.log.nodes import said
+from runtime.log.leaves import said
 from runtime.log.sink import Sink
 
 AXES = ("vx", "vy", "wz")

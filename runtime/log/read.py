@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
-from rerun.chunk import RrdReader
-from rerun.error_utils import RerunWarning
 
-from drivers.interface.errors import ConfigurationError
-from drivers.interface.sensed import Sensed
 from runtime.log import rvl
-from runtime.log.checksum import Cells, checksums
 from runtime.log.columns import IMAGE_COMPONENT
-from runtime.log.exact import CHECK, consumed_schemas
-from runtime.log.schema import Schema
-from runtime.log.sink import APPLICATION
+from runtime.log.events import EVENTS
+from runtime.log.exact import CHECK
+from runtime.log.opening import chunks
 
 _NOT_CONTENT = ("/timing", "/run")
 STATIC = -1  # stands for the tick of what holds for the whole run
@@ -61,32 +54,34 @@ def read(path: Path, content: str = "/**") -> Log:
     Raises:
         ConfigurationError: the file is missing, empty, cut, or not a log of ours.
     """
-    require_log(path)
     entities: dict[str, dict[str, dict[int, Cell]]] = {}
-    for chunk in _chunks(path, content):
+    for chunk in chunks(path, content):
         batch = chunk.to_record_batch()
-        ticks = next((c.to_pylist() for name, c in _columns(batch, b"index") if name == "tick"), [STATIC] * batch.num_rows)
+        times = next((c.to_pylist() for name, c in _columns(batch, b"index") if name == "tick"), [STATIC] * batch.num_rows)
         for name, column in _columns(batch, b"data"):
-            entities.setdefault(chunk.entity_path, {}).setdefault(name, {}).update(_cells(ticks, column))
+            held = entities.setdefault(chunk.entity_path, {}).setdefault(name, {})
+            for tick, cell in _cells(times, column):
+                held[tick] = _joined(held[tick], cell) if tick in held else cell
     return Log(path, {entity: _ordered(entities[entity]) for entity in sorted(entities)})
 
 
-def sensed_at(log: Log, tick: int) -> Sensed:
-    """Return what the loop consumed at a tick, as it was.
+def ticks(path: Path) -> list[int]:
+    """Return every tick that a log holds.
 
     Raises:
-        ConfigurationError: the log does not hold all of it.
+        ConfigurationError: see `read`.
     """
-    try:
-        parts = {name: schema.take(log.at(schema.entity, tick)) for name, schema in _schemas().items()}
-    except ValueError as error:
-        raise ConfigurationError(f"tick {tick} of {log.path} cannot be replayed: {error}") from error
-    return Sensed(**parts)
+    return read(path, CHECK).ticks
 
 
-def damaged_ticks(log: Log) -> list[int]:
-    """Return the ticks whose checksum does not fit what the log holds of them."""
-    return [tick for tick, crc in log.history(CHECK, "crc32").items() if int(crc[0]) != _checksum(log, tick)]
+def texts(path: Path) -> str:
+    """Return what a log says in words, a line each: faults, responses, the operator's actions.
+
+    Raises:
+        ConfigurationError: see `read`.
+    """
+    history = read(path, EVENTS).history(EVENTS, "TextLog:text")
+    return "\n".join(text for cell in history.values() for text in cell)
 
 
 def same_content(first: Path, second: Path) -> str:
@@ -101,47 +96,6 @@ def same_content(first: Path, second: Path) -> str:
         if not entity.startswith(_NOT_CONTENT)
     ]
     return min((difference for difference in found if difference is not None), default=(0, ""))[1]
-
-
-def require_log(path: Path) -> None:
-    """Check that a file is a log of ours.
-
-    Raises:
-        ConfigurationError: it is not; says why.
-    """
-    if not path.is_file():
-        raise ConfigurationError(f"there is no log {path}")
-    if path.stat().st_size == 0:
-        raise ConfigurationError(f"the log {path} is empty")
-    with path.open("rb") as file:
-        if not file.read(4).startswith(b"RRF"):
-            raise ConfigurationError(f"{path} is not a Rerun recording")
-    try:
-        applications = {entry.application_id for entry in _reader(path).recordings()}
-    except (RuntimeError, ValueError, OSError) as error:
-        raise _damaged(path, error) from error
-    if APPLICATION not in applications:
-        raise ConfigurationError(f"{path} was not recorded by trundle but by {', '.join(sorted(applications)) or 'nobody'}")
-
-
-def _chunks(path: Path, content: str) -> Iterator[Any]:
-    try:
-        yield from _reader(path).stream().filter(content=content)
-    except (RuntimeError, ValueError, OSError) as error:
-        raise _damaged(path, error) from error
-
-
-def _reader(path: Path) -> RrdReader:
-    with warnings.catch_warnings(action="ignore", category=RerunWarning):  # a killed process leaves no footer: readable
-        return RrdReader(path)
-
-
-def _damaged(path: Path, error: Exception) -> ConfigurationError:
-    reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-    return ConfigurationError(
-        f"the log {path} is damaged ({reason}); "
-        f"`rerun rrd optimize --continue-on-error {path} -o REPAIRED.rrd` saves what can be read"
-    )
 
 
 def _ordered(components: Mapping[str, History]) -> dict[str, History]:
@@ -166,24 +120,18 @@ def _cells(ticks: list[int], column: pa.Array) -> Iterator[tuple[int, Cell]]:
             yield tick, values[start:end] if values is not None else _listed(flat[start:end])
 
 
+def _joined(first: Cell, second: Cell) -> Cell:
+    """Return the values of two rows of the same tick, as texts have them."""
+    if isinstance(first, np.ndarray) and isinstance(second, np.ndarray):
+        return np.concatenate((first, second))
+    return [*first, *second]
+
+
 def _listed(flat: pa.Array) -> list[Any]:
     """Return texts as they are, and bytes or structures in a form that compares bit by bit."""
     if pa.types.is_list(flat.type) and pa.types.is_uint8(flat.type.value_type):
         return [item.values.to_numpy() for item in flat]
     return list(flat.to_pylist())
-
-
-@cache
-def _schemas() -> dict[str, Schema]:
-    return consumed_schemas()
-
-
-def _checksum(log: Log, tick: int) -> int:
-    cells: list[Cells] = []
-    for schema in _schemas().values():
-        row = log.at(schema.entity, tick)
-        cells += [Cells(f"{schema.entity} {name}", row[name], [len(row[name])]) for name in schema.columns if name in row]
-    return checksums(cells, 1)[0]
 
 
 def _addresses(log: Log) -> set[tuple[str, str]]:

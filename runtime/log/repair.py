@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from drivers.interface.errors import ConfigurationError
-from runtime.log.read import require_log
+from runtime.log.opening import require_log
 
 
 def rerun_program() -> str:

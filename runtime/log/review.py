@@ -13,8 +13,8 @@ from pathlib import Path
 from rerun.experimental import ViewerClient
 
 from drivers.interface.errors import ConfigurationError
-from runtime.log.exact import CHECK
-from runtime.log.read import read, require_log
+from runtime.log.opening import require_log
+from runtime.log.read import ticks
 from runtime.log.repair import quiet_environment, rerun_program
 
 WINDOW = "1920x1080"
@@ -47,9 +47,9 @@ def review(log: Path, at_tick: int | None = None, screenshot: Path | None = None
 
 
 def _require_tick(log: Path, tick: int) -> None:
-    ticks = read(log, CHECK).ticks
-    if tick not in ticks:
-        span = f"ticks {ticks[0]} to {ticks[-1]}" if ticks else "no tick"
+    held = ticks(log)
+    if tick not in held:
+        span = f"ticks {held[0]} to {held[-1]}" if held else "no tick"
         raise ConfigurationError(f"--at {tick}: the log {log} holds {span}, not this one")
 
 

@@ -11,7 +11,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from planners.planner import Diagnostics
-from runtime.log import nodes
+from runtime.log import leaves, nodes
 from runtime.log.columns import Column, Kind
 
 _KINDS = {int: Kind.INT, float: Kind.FLOAT, bool: Kind.FLAG, str: Kind.TEXT}
@@ -65,7 +65,7 @@ class Schema:
 
     def _node(self, name: str, hint: Any) -> nodes.Node:
         if hint in _KINDS:
-            return nodes.Scalar(self._column(name, _KINDS[hint]), hint)
+            return leaves.Scalar(self._column(name, _KINDS[hint]), hint)
         if get_origin(hint) in {types.UnionType, Union}:
             return self._union(name, get_args(hint))
         if get_origin(hint) is tuple:
@@ -73,9 +73,9 @@ class Schema:
         if get_origin(hint) is np.ndarray:
             return self._array(name, get_args(get_args(hint)[1])[0])
         if isinstance(hint, type) and issubclass(hint, enum.Enum):
-            return nodes.Enumeration(self._column(name, Kind.TEXT), hint)
+            return leaves.Enumeration(self._column(name, Kind.TEXT), hint)
         if hint is Diagnostics:
-            return nodes.Said(self._column(_join(name, "type"), Kind.TEXT), self._said(name))
+            return leaves.Said(self._column(_join(name, "type"), Kind.TEXT), self._said(name))
         if isinstance(hint, type) and is_dataclass(hint):
             hints = get_type_hints(hint)
             return nodes.Record(hint, {f.name: self._node(_join(name, f.name), hints[f.name]) for f in fields(hint)})
@@ -98,10 +98,10 @@ class Schema:
 
     def _array(self, name: str, dtype: Any) -> nodes.Node:
         if dtype is np.float64:
-            return nodes.Array(self._column(_join(name, "shape"), Kind.INT), self._column(name, Kind.FLOAT))
+            return leaves.Array(self._column(_join(name, "shape"), Kind.INT), self._column(name, Kind.FLOAT))
         if dtype is np.uint16:
-            return nodes.Image(self._column(name, Kind.IMAGE), self._images)
-        return nodes.Digest(self._column(_join(name, "crc32"), Kind.INT))
+            return leaves.Image(self._column(name, Kind.IMAGE), self._images)
+        return leaves.Digest(self._column(_join(name, "crc32"), Kind.INT))
 
     def _said(self, name: str) -> Any:
         def column(field: str, kind: type) -> Column:

@@ -5,9 +5,10 @@ import pytest
 import rerun as rr
 
 from drivers.interface.errors import ConfigurationError
-from runtime.log.read import damaged_ticks, read
+from runtime.log.read import read, texts, ticks
 from runtime.log.repair import repair
 from runtime.log.review import review
+from runtime.log.verify import damaged_ticks
 from tests.runtime.log_cycles import bits, make_cycles
 from tests.runtime.test_log_recorder import record
 
@@ -37,6 +38,20 @@ def test_a_flipped_bit_is_an_error_or_named_but_never_silently_other_data(log: P
         for entity in good.entities:
             if entity.startswith("/replay/sensed"):
                 assert cells(found, entity, tick) == cells(good, entity, tick)
+
+
+def test_the_words_tell_what_happened_and_when_it_was_over(log: Path) -> None:
+    assert ticks(log) == list(range(12))
+    assert texts(log).splitlines() == [
+        "response: RUN",
+        "operator: jog 0.1 m/s, 0 m/s, -0 rad/s",
+        "operator: new goal at 1 m, 2 m",
+        "fault: silent_device of camera: nothing for 210 ms",
+        "response: STAND_DOWN",
+        "over: silent_device of camera",
+        "response: RUN",
+        "operator: jog 0.1 m/s, 0 m/s, -0 rad/s",
+    ]
 
 
 def cells(log, entity: str, tick: int) -> object:  # type: ignore[no-untyped-def]

@@ -11,10 +11,11 @@ import pytest
 from drivers.interface.commands import BodyTwist
 from drivers.interface.errors import ConfigurationError
 from runtime.cycle import Cycle
-from runtime.log.read import damaged_ticks, read, same_content, sensed_at
+from runtime.log.read import read, same_content
 from runtime.log.recorder import Recorder, RecorderReport
 from runtime.log.repair import repair
 from runtime.log.settings import LogSettings
+from runtime.log.verify import damaged_ticks, sensed_at
 from tests.runtime.log_cycles import bits, header, make_cycles
 
 CYCLES = make_cycles(60)

@@ -1,0 +1,43 @@
+"""What replay needs of a log: what the loop consumed at each tick as it was, and whether it is undamaged."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from drivers.interface.errors import ConfigurationError
+from drivers.interface.sensed import Sensed
+from runtime.log.checksum import Cells, checksums
+from runtime.log.exact import CHECK, consumed_schemas
+from runtime.log.read import Log
+from runtime.log.schema import Schema
+
+
+def sensed_at(log: Log, tick: int) -> Sensed:
+    """Return what the loop consumed at a tick, as it was.
+
+    Raises:
+        ConfigurationError: the log does not hold all of it.
+    """
+    try:
+        parts = {name: schema.take(log.at(schema.entity, tick)) for name, schema in _schemas().items()}
+    except ValueError as error:
+        raise ConfigurationError(f"tick {tick} of {log.path} cannot be replayed: {error}") from error
+    return Sensed(**parts)
+
+
+def damaged_ticks(log: Log) -> list[int]:
+    """Return the ticks whose checksum does not fit what the log holds of them."""
+    return [tick for tick, crc in log.history(CHECK, "crc32").items() if int(crc[0]) != _checksum(log, tick)]
+
+
+@cache
+def _schemas() -> dict[str, Schema]:
+    return consumed_schemas()
+
+
+def _checksum(log: Log, tick: int) -> int:
+    cells: list[Cells] = []
+    for schema in _schemas().values():
+        row = log.at(schema.entity, tick)
+        cells += [Cells(f"{schema.entity} {name}", row[name], [len(row[name])]) for name in schema.columns if name in row]
+    return checksums(cells, 1)[0]
