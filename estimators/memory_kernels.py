@@ -29,11 +29,17 @@ def fold(
     static_ns: int,
     dynamic_ns: int,
 ) -> None:
-    """Overwrite what was seen; keep what was not, occupied cells no longer than their retention."""
+    """Overwrite what was seen; keep what was not, occupied cells no longer than their retention.
+
+    A ray is drawn only to the nearest cell, so it may graze an obstacle that it really passes by.  Farther away the next
+    frame sees the obstacle again; in the blind zone none will, so there a cell must be free with all its neighbours.
+    """
     for row in range(label.shape[0]):
         for column in range(label.shape[1]):
             at = row, column
-            if seen[at] == FREE:
+            if seen[at] == FREE and label[at] == OCCUPIED and blind[at] and not _amid_free(seen, row, column):
+                occupied_ns[at] = now_ns
+            elif seen[at] == FREE:
                 label[at], free_ns[at] = FREE, now_ns
             elif seen[at] == OCCUPIED:
                 if label[at] != OCCUPIED:
@@ -46,6 +52,16 @@ def fold(
                     occupied_ns[at] = now_ns
                 elif now_ns - occupied_ns[at] > (dynamic_ns if dynamic[at] else static_ns):
                     label[at] = UNKNOWN
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _amid_free(seen: U8, row: int, column: int) -> bool:
+    """Tell whether the eight cells around one are free too."""
+    for r in range(max(row - 1, 0), min(row + 2, seen.shape[0])):
+        for c in range(max(column - 1, 0), min(column + 2, seen.shape[1])):
+            if seen[r, c] != FREE:
+                return False
+    return True
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

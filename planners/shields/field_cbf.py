@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from drivers.interface.commands import BodyTwist, Command
+from drivers.interface.commands import BaseLimits, BodyTwist, Command
 from drivers.interface.samples import frozen_array
 from drivers.interface.settings import Settings
 from estimators.belief import Belief
@@ -53,6 +53,12 @@ class FieldCbf:
             le=2.0,
             description="dt of equation 8: how long a boundary closes in unanswered; the control period, if longer",
         )
+        braking_allowance: float = Field(
+            1.0,
+            ge=0.0,
+            le=5.0,
+            description="widens gate and search by so many times what the base takes to stop; 0: the paper's base stops at once",
+        )
         on_infeasible: Literal["least_violation", "stop"] = Field(
             "least_violation", description="retreat along the direction that fails the worst constraint least, or stop"
         )
@@ -60,14 +66,16 @@ class FieldCbf:
     def __init__(self, settings: Settings, setup: ShieldSetup) -> None:
         """Take the settings."""
         s = settings
+        braking_s = s.braking_allowance * _braking_time_s(setup.limits)
+        braking_m = 0.0 if setup.limits is None else braking_s * setup.limits.velocity.vx
         self._stop_when_infeasible = s.on_infeasible == "stop"
         self._barrier = Barrier(
             safe_m=setup.robot_radius_m + s.d_min_m,
             directions=s.directions,
-            sample_radius_m=s.sample_radius_m,
+            sample_radius_m=s.sample_radius_m + braking_m,
             alpha_per_s=s.alpha_per_s,
             guard_m=s.guard_m,
-            contact_time_s=s.contact_time_s,
+            contact_time_s=s.contact_time_s + braking_s,
             reaction_s=max(s.reaction_time_s, setup.period_s),
             buffer_gain=s.buffer_gain,
             buffer_min_m=s.buffer_min_m,
@@ -113,3 +121,8 @@ class FieldCbf:
             vx, vy = 0.0, 0.0
         least_h_m = nearest_m - self._barrier.safe_m
         return vx, vy, FieldCbfDiagnostics(samples, active, least_h_m, infeasible, slack, enclosed)
+
+
+def _braking_time_s(limits: BaseLimits | None) -> float:
+    """Return how long the base takes to stop from full speed within its normal acceleration [s]."""
+    return 0.0 if limits is None else limits.velocity.vx / limits.acceleration.vx

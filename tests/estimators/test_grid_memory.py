@@ -96,6 +96,17 @@ def test_in_the_blind_zone_an_obstacle_persists_until_seen_free():
     assert at(grid, *place) == FREE
 
 
+def test_in_the_blind_zone_a_ray_that_grazes_an_obstacle_does_not_take_it_away():
+    grid, wall = memory(), [(0.3, 0.025), (0.3, -0.025)]
+    grid.merge(frame_of(dict.fromkeys(wall, OCCUPIED)), 0, ORIGIN)
+    grazed = frame_of({(0.3, 0.075): FREE, wall[0]: FREE}, blind=[*wall, (0.3, 0.075)])
+    grid.merge(grazed, SECOND, ORIGIN)
+    assert [at(grid, *cell) for cell in wall] == [OCCUPIED, OCCUPIED]
+    around = {(0.3 + 0.05 * i, 0.025 + 0.05 * j): FREE for i in (-1, 0, 1) for j in (-2, -1, 0, 1)}
+    grid.merge(frame_of(around, blind=wall), 2 * SECOND, ORIGIN)
+    assert [at(grid, *cell) for cell in wall] == [FREE, FREE]
+
+
 def test_the_window_rolls_by_whole_cells_and_forgets_what_leaves_it():
     grid = memory()
     grid.merge(frame_of({(0.52, 0.42): OCCUPIED, (-0.98, 0.02): OCCUPIED}), 0, ORIGIN)

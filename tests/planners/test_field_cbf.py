@@ -86,7 +86,8 @@ def test_command_is_left_alone_where_nothing_is_near():
 
 
 def test_sliding_along_a_wall_is_not_hindered():
-    filtered = shield_of().filter(command_of(BodyTwist(0.5, 0.0, 0.0)), belief_of([Box(-3, 0.32, 3, 0.5)]), CAPS)
+    papers = shield_of(braking_allowance=0.0)
+    filtered = papers.filter(command_of(BodyTwist(0.5, 0.0, 0.0)), belief_of([Box(-3, 0.32, 3, 0.5)]), CAPS)
     assert not filtered.intervened
     assert filtered.diagnostics.samples > 3
 
