@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -35,6 +36,21 @@ class _Entry(NamedTuple):
     lost_before: int
 
 
+class _Signal:
+    """Wakes the one thread that waits for it; given twice before it is taken, it counts once.  A bare lock costs least."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._lock.acquire()
+
+    def give(self) -> None:
+        with suppress(RuntimeError):  # it was given already
+            self._lock.release()
+
+    def take(self, timeout_s: float) -> None:
+        self._lock.acquire(timeout=timeout_s)
+
+
 class Recorder:
     """Records cycles.  Without a path and a live view it does nothing.
 
@@ -48,8 +64,10 @@ class Recorder:
         """Touch nothing yet."""
         self._path, self._settings, self._header = path, settings, header
         self._lockstep, self._live = lockstep, live
-        self._queue: deque[_Entry] = deque()
-        self._changed = threading.Condition()
+        self._capacity = settings.queue_ticks
+        self._queue: deque[_Entry] = deque()  # appended to by the loop, popped from by the writer: each is atomic
+        self._work = _Signal()
+        self._room = _Signal()
         self._thread: threading.Thread | None = None
         self._writer: Writer | None = None
         self._closing = False
@@ -80,19 +98,20 @@ class Recorder:
         if self._thread is None or self._closing or self._fault:
             self._dropped_ticks += self._path is not None
             return
-        with self._changed:
-            if len(self._queue) >= self._settings.queue_ticks and not self._make_room():
+        waiting = len(self._queue)
+        if waiting >= self._capacity:
+            waiting = self._await_room() if self._lockstep else waiting
+            if waiting >= self._capacity:
                 self._lost += 1
                 self._dropped_ticks += 1
                 return
-            waiting = len(self._queue)
-            drawn = self._lockstep or 2 * waiting < self._settings.queue_ticks
-            self._dropped_views += not drawn
-            self._queue.append(_Entry(cycle, drawn, self._lost))
-            self._lost = 0
-            self._high_water = max(self._high_water, waiting + 1)
-            if waiting + 1 >= (self._due or self._ticks_due(cycle)):
-                self._changed.notify_all()
+        drawn = self._lockstep or 2 * waiting < self._capacity
+        self._dropped_views += not drawn
+        self._queue.append(_Entry(cycle, drawn, self._lost))
+        self._lost = 0
+        self._high_water = max(self._high_water, waiting + 1)
+        if waiting + 1 >= (self._due or self._ticks_due(cycle)):
+            self._work.give()
 
     def fault(self) -> str:
         """Return why the log can no longer be written; empty while it can."""
@@ -100,9 +119,8 @@ class Recorder:
 
     def close(self) -> RecorderReport:
         """Write what waits, finish the file and return how it went; again and again the same."""
-        with self._changed:
-            self._closing = True
-            self._changed.notify_all()
+        self._closing = True
+        self._work.give()
         if self._thread is not None:
             self._thread.join(3 * _CLOSE_TIMEOUT_S)
         return RecorderReport(
@@ -114,17 +132,17 @@ class Recorder:
             fault=self.fault(),
         )
 
-    def _make_room(self) -> bool:
-        if not self._lockstep:
-            return False
-        self._changed.notify_all()
-        self._changed.wait_for(lambda: len(self._queue) < self._settings.queue_ticks or bool(self._fault))
-        return not self._fault
+    def _await_room(self) -> int:
+        """Wait for the writer and return how many ticks wait in the queue; still full: the log has failed."""
+        self._work.give()
+        while (waiting := len(self._queue)) >= self._capacity and not self._fault:
+            self._room.take(self._settings.flush_interval_s)
+        return waiting if not self._fault else self._capacity
 
     def _ticks_due(self, cycle: Cycle) -> int:
         """Return after how many ticks to wake the writer: right after a tick's work is the best time for it to run."""
         in_interval = int(self._settings.flush_interval_s * 1e9) // cycle.sensed.tick.period_ns
-        most = min(self._settings.batch_ticks, self._settings.queue_ticks)
+        most = min(self._settings.batch_ticks, self._capacity)
         self._due = most if self._lockstep else max(1, min(most, in_interval))
         return self._due
 
@@ -142,11 +160,10 @@ class Recorder:
 
     def _write_batch(self, writer: Writer) -> bool:
         """Write what waits and flush it; return whether there may be more to come."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._closing or len(self._queue) >= (self._due or 1), self._settings.flush_interval_s)
-            count = min(len(self._queue), self._settings.batch_ticks)
-            entries = [self._queue.popleft() for _ in range(count)]
-            self._changed.notify_all()
+        if not self._closing and len(self._queue) < (self._due or 1):
+            self._work.take(self._settings.flush_interval_s)
+        entries = [self._queue.popleft() for _ in range(min(len(self._queue), self._settings.batch_ticks))]
+        self._room.give()
         for entry in entries:
             writer.put(entry.cycle, drawn=entry.drawn, lost_before=entry.lost_before)
         writer.send()
@@ -159,8 +176,7 @@ class Recorder:
         return bool(self._queue) or not self._closing
 
     def _fail(self, sentence: str) -> None:
-        with self._changed:
-            self._fault = self._fault or sentence
-            self._dropped_ticks += len(self._queue)
-            self._queue.clear()
-            self._changed.notify_all()
+        self._fault = self._fault or sentence
+        self._dropped_ticks += len(self._queue)
+        self._queue.clear()
+        self._room.give()

@@ -84,16 +84,13 @@ def test_a_missing_tick_is_a_difference(log: Path, tmp_path: Path) -> None:
 
 
 def test_a_full_queue_costs_drawings_first_and_then_ticks_and_all_is_counted(tmp_path: Path) -> None:
-    recorder = Recorder(tmp_path / "a.rrd", LogSettings(queue_ticks=10), header(), lockstep=False)
+    recorder = Recorder(tmp_path / "a.rrd", LogSettings(queue_ticks=10, flush_interval_s=10), header(), lockstep=False)
     recorder.open()
-    with recorder._changed:  # the writer cannot take anything, the loop can still hand over (the lock is reentrant)
-        for cycle in CYCLES[:14]:
-            recorder.record(cycle)
-    for _ in range(1000):
-        if not recorder._queue:
-            break
-        with recorder._changed:
-            recorder._changed.wait(0.01)
+    recorder._due = 11  # nobody wakes the writer
+    for cycle in CYCLES[:14]:
+        recorder.record(cycle)
+    recorder._work.give()
+    recorder._room.take(10)
     recorder.record(CYCLES[14])
     report = recorder.close()
     assert (report.written_ticks, report.dropped_views, report.dropped_ticks, report.queue_high_water) == (11, 5, 4, 10)
@@ -162,8 +159,7 @@ def test_a_stalled_disk_costs_ticks_but_no_memory_and_no_time(tmp_path: Path, mo
     recorder.open()
     for cycle in CYCLES * 20:
         recorder.record(cycle)
-        with recorder._changed:
-            recorder._changed.wait(0.001)  # as a loop that sleeps
+        recorder._room.take(0.001)  # as a loop that sleeps
     report = recorder.close()
     assert report.fault == f"the log {path} is incomplete: its disk is stalled"
     assert report.queue_high_water == 10
