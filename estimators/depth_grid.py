@@ -94,9 +94,10 @@ class DepthGrid:
         camera = ((x - lattice.x_m) / cell_m, (y - lattice.y_m) / cell_m)
         hits = np.zeros((lattice.rows, lattice.columns), dtype=np.int32)
         free_ends = np.zeros((lattice.rows, lattice.columns), dtype=np.uint8)
-        self._collect(frame, rotation, camera, hits, free_ends)
+        clear_m = np.zeros(frame.depth.shape[1])
+        self._collect(frame, rotation, camera, hits, free_ends, clear_m)
         grid = label_frame(lattice, hits, free_ends, camera, settings.hits_min, settings.component_cells_min)
-        return FrameLabels(grid, frozen_array(self._blind(frame, rotation, camera, grid.label.shape)))
+        return FrameLabels(grid, frozen_array(self._blind(frame, rotation, camera, clear_m, grid.label.shape)))
 
     def _collect(
         self,
@@ -105,6 +106,7 @@ class DepthGrid:
         camera: tuple[float, float],
         hits: NDArray[np.int32],
         free_ends: U8,
+        clear_m: F64,
     ) -> None:
         settings, k, unit = self._settings, frame.intrinsics, frame.depth_unit_m
         depth = np.ascontiguousarray(frame.depth).view()
@@ -123,13 +125,14 @@ class DepthGrid:
             (settings.range_min_m, settings.range_max_m),
             hits,
             free_ends,
+            clear_m,
         )
 
-    def _blind(self, frame: DepthFrame, rotation: F64, camera: tuple[float, float], shape: tuple[int, ...]) -> Mask:
+    def _blind(self, frame: DepthFrame, rotation: F64, camera: tuple[float, float], clear_m: F64, shape: tuple[int, ...]) -> Mask:
         k, blind = frame.intrinsics, np.zeros(shape, dtype=np.bool_)
         level = math.hypot(rotation[0, 2], rotation[1, 2])
         if level > 1e-3:  # a camera that looks straight down has no direction along the floor
             forward = (float(rotation[0, 2] / level), float(rotation[1, 2] / level))
-            slopes = ((k.width - 0.5 - k.cx) / k.fx, (k.cx + 0.5) / k.fx)
-            outline_blind(camera, forward, slopes, self._settings.blind_range_m / self._cell_m, blind)
+            reach_cells = self._settings.blind_range_m / self._cell_m
+            outline_blind(camera, forward, (float(k.fx), float(k.cx)), clear_m / self._cell_m, reach_cells, blind)
         return blind

@@ -39,6 +39,7 @@ def _end_rays(
     ranges: tuple[float, float],
     columns: np.int32,
     ends: I32,  # (width,), written
+    clear_m: F64,  # (width,), raised to the depth that this row proves empty in each column
 ) -> None:
     """Write for each pixel of a row the flat index of the cell where its ray hits, its complement where it ends unhindered.
 
@@ -53,6 +54,7 @@ def _end_rays(
         index = np.int32(camera[1] + end * dy * cells_per_m) * columns + np.int32(camera[0] + end * dx * cells_per_m)
         useful = (row[u] >= raw_limits[0]) & (row[u] <= raw_limits[1]) & (leaves >= ranges[0])
         ends[u] = (index if z <= reach else ~index) if useful else NOTHING
+        clear_m[u] = max(clear_m[u], end if useful else 0.0)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -77,6 +79,7 @@ def collect_depth(
     ranges: tuple[float, float],  # minimum depth and maximum planar range [m]
     hits: I32,  # (rows, columns), counted up
     free_ends: U8,  # (rows, columns), set to 1
+    clear_m: F64,  # (width,), raised to the depth that is proven empty inside the slab in each image column
 ) -> None:
     """Count the returns inside the slab per cell, and mark the cells in which the other rays end.
 
@@ -95,7 +98,7 @@ def collect_depth(
         if _row_is_useless(min(rise, last_rise), max(rise, last_rise), slab, ranges[0]):
             continue
         first = (left[0], left[1], left[2])
-        _end_rays(depth[v], raw_limits, depth_unit_m, first, step, camera, 1.0 / cell_m, slab, ranges, columns, ends)
+        _end_rays(depth[v], raw_limits, depth_unit_m, first, step, camera, 1.0 / cell_m, slab, ranges, columns, ends, clear_m)
         _count(ends, hits.reshape(-1), free_ends.reshape(-1))
 
 
@@ -103,15 +106,31 @@ def collect_depth(
 def outline_blind(
     camera: tuple[float, float],  # x, y in cells from the lattice's corner
     forward: tuple[float, float],  # the optical axis in odom, along the floor, unit length
-    slopes: tuple[float, float],  # tangents of the view's edges, right and left of the axis
+    pinhole: tuple[float, float],  # fx, cx [pixels]
+    clear_cells: F64,  # (width,), depth proven empty in each image column
     reach_cells: float,
-    blind: NDArray[Any],  # (rows, columns) bool, set where the camera looks but is too near to see
+    blind: NDArray[Any],  # (rows, columns) bool, written
 ) -> None:
-    """Mark the cells in view that are nearer than the camera can measure."""
-    reach = math.ceil(reach_cells * math.sqrt(1.0 + max(slopes[0], slopes[1]) ** 2)) + 1
+    """Mark the cells in view where an obstacle may be too near to give returns, unless every image column that looks at a
+    cell sees past it.
+    """
+    fx, cx = pinhole
+    width = len(clear_cells)
+    slope = max(cx + 0.5, width - 0.5 - cx) / fx
+    reach = math.ceil(reach_cells * math.sqrt(1.0 + slope**2)) + 1
     row0, column0 = int(camera[1]), int(camera[0])
     for row in range(max(row0 - reach, 0), min(row0 + reach + 1, blind.shape[0])):
         for column in range(max(column0 - reach, 0), min(column0 + reach + 1, blind.shape[1])):
             x, y = column + 0.5 - camera[0], row + 0.5 - camera[1]
             ahead, left = forward[0] * x + forward[1] * y, forward[0] * y - forward[1] * x
-            blind[row, column] = 0.0 < ahead <= reach_cells and -slopes[0] * ahead <= left <= slopes[1] * ahead
+            if 0.0 < ahead <= reach_cells and -0.5 <= cx - fx * left / ahead <= width - 0.5:
+                blind[row, column] = not _is_seen_past(ahead, left, fx, cx, clear_cells)
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _is_seen_past(ahead: float, left: float, fx: float, cx: float, clear_cells: F64) -> bool:
+    half = math.sqrt(0.5)  # of a cell's diagonal
+    nearest = max(ahead - half, 0.1)
+    first = max(math.floor(cx - fx * (left + half) / nearest), 0)
+    last = min(math.ceil(cx - fx * (left - half) / nearest), len(clear_cells) - 1)
+    return bool(np.all(clear_cells[first : last + 1] >= ahead + half))

@@ -22,7 +22,7 @@ def fold(
     since_ns: I64,  # (rows, columns), since when occupied without having been seen free
     dynamic: Flags,  # (rows, columns), whether occupied by something that came
     seen: U8,  # (rows, columns), the frame's labels
-    blind: Flags,  # (rows, columns), where the sensor looked but was too near to see
+    blind: Flags,  # (rows, columns), where an obstacle may be too near to give returns
     now_ns: int,
     recent_ns: int,
     settle_ns: int,
@@ -31,15 +31,13 @@ def fold(
 ) -> None:
     """Overwrite what was seen; keep what was not, occupied cells no longer than their retention.
 
-    A ray is drawn only to the nearest cell, so it may graze an obstacle that it really passes by.  Farther away the next
-    frame sees the obstacle again; in the blind zone none will, so there a cell must be free with all its neighbours.
+    Rays are drawn only to the nearest cell, so one that passes an obstacle by may graze it.  Farther away the next frame sees
+    the obstacle again; where the sensor is blind none will, so there a ray takes nothing away.
     """
     for row in range(label.shape[0]):
         for column in range(label.shape[1]):
             at = row, column
-            if seen[at] == FREE and label[at] == OCCUPIED and blind[at] and not _amid_free(seen, row, column):
-                occupied_ns[at] = now_ns
-            elif seen[at] == FREE:
+            if seen[at] == FREE and not (blind[at] and label[at] == OCCUPIED):
                 label[at], free_ns[at] = FREE, now_ns
             elif seen[at] == OCCUPIED:
                 if label[at] != OCCUPIED:
@@ -52,16 +50,6 @@ def fold(
                     occupied_ns[at] = now_ns
                 elif now_ns - occupied_ns[at] > (dynamic_ns if dynamic[at] else static_ns):
                     label[at] = UNKNOWN
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _amid_free(seen: U8, row: int, column: int) -> bool:
-    """Tell whether the eight cells around one are free too."""
-    for r in range(max(row - 1, 0), min(row + 2, seen.shape[0])):
-        for c in range(max(column - 1, 0), min(column + 2, seen.shape[1])):
-            if seen[r, c] != FREE:
-                return False
-    return True
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -193,6 +193,16 @@ def test_blind_where_the_camera_looks_but_is_too_near():
     assert len(x) == pytest.approx(0.6 * 0.6 * (79.1 + 80.9) / 2 / 82.0 / CELL_M**2, rel=0.1)
 
 
+def test_it_is_not_blind_where_every_column_of_a_cell_sees_past_it():
+    assert not DepthGrid(DepthGridSettings(), CELL_M).label(frame([Floor()]), SE2()).blind.any()
+    seen = DepthGrid(DepthGridSettings(range_min_m=0.6), CELL_M).label(frame([Floor(), Pillar(0.5, 0.0, 0.06)]), SE2())
+    rows, columns = np.nonzero(seen.blind)
+    x, y = seen.grid.lattice.centres(rows, columns).T
+    shadow = np.hypot(x, y) * np.sin(np.abs(np.arctan2(y, x)) - math.asin(0.06 / 0.5))  # off the cone behind the pillar
+    assert (shadow < 0.6 * CELL_M * math.sqrt(2.0)).all()
+    assert seen.blind[seen.grid.lattice.cell_of(np.array([[0.45, 0.0], [0.5, 0.04], [0.5, -0.04]]))].all()
+
+
 def test_frames_that_are_not_sound():
     good = frame([Wall(0.0, 1.5)])
     assert is_sound(good)
