@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 import socket
 import subprocess
+import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import suppress
 from pathlib import Path
 
 from rerun.experimental import ViewerClient
@@ -35,15 +35,16 @@ def review(log: Path, at_tick: int | None = None, screenshot: Path | None = None
         _require_tick(log, at_tick)
     if screenshot is None and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise ConfigurationError("there is no display to open the viewer on; --screenshot PATH takes a picture without one")
-    with _viewer(log, window, headless=screenshot is not None) as (process, url):
+    with _Viewer(log, window, headless=screenshot is not None) as viewer:
         if at_tick is not None or screenshot is not None:
-            client = _connect(process, url)
+            client = _connect(viewer)
             if at_tick is not None:
                 client.set_time("tick", sequence=at_tick, play_state="paused")
             if screenshot is not None:
                 _take(client, screenshot)
                 return
-        process.wait()
+        if viewer.process.wait() != 0:
+            raise viewer.failure()
 
 
 def _require_tick(log: Path, tick: int) -> None:
@@ -53,22 +54,32 @@ def _require_tick(log: Path, tick: int) -> None:
         raise ConfigurationError(f"--at {tick}: the log {log} holds {span}, not this one")
 
 
-@contextmanager
-def _viewer(log: Path, window: str, *, headless: bool) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
-    """Run a viewer for as long as the block lasts."""
-    port = _free_port()
-    command = [rerun_program(), "--bind", "127.0.0.1", "--port", str(port), "--window-size", window, str(log)]
-    process = subprocess.Popen(
-        [*command, "--headless"] if headless else command,
-        env=quiet_environment(),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-    )
-    try:
-        yield process, f"rerun+http://127.0.0.1:{port}/proxy"
-    finally:
-        process.kill()  # it holds nothing that a friendlier end would save
-        process.communicate()
+class _Viewer:
+    """A viewer process; what it says goes to a file, as a pipe that nobody reads would stall it."""
+
+    def __init__(self, log: Path, window: str, *, headless: bool) -> None:
+        self._said = tempfile.TemporaryFile()  # noqa: SIM115 - closed in __exit__
+        port = _free_port()
+        self.url = f"rerun+http://127.0.0.1:{port}/proxy"
+        command = [rerun_program(), "--bind", "127.0.0.1", "--port", str(port), "--window-size", window, str(log)]
+        command += ["--headless"] if headless else []
+        self.process = subprocess.Popen(command, env=quiet_environment(), stdout=subprocess.DEVNULL, stderr=self._said)
+
+    def __enter__(self) -> _Viewer:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.kill()  # it holds nothing that a friendlier end would save
+        self.process.wait()
+        self._said.close()
+
+    def failure(self) -> ConfigurationError:
+        """Return why the viewer ended by itself."""
+        self._said.seek(0)
+        said = self._said.read().decode(errors="replace").strip()
+        if any(word in said.lower() for word in ("graphics adapter", "vulkan", "wgpu", "libx", "winit")):
+            return ConfigurationError(f"the viewer finds no graphics; on Debian or Ubuntu: apt-get install {_PACKAGES}")
+        return ConfigurationError(f"the viewer ended: {said.splitlines()[-1] if said else 'it said nothing'}")
 
 
 def _free_port() -> int:
@@ -77,29 +88,19 @@ def _free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def _connect(process: subprocess.Popen[bytes], url: str) -> ViewerClient:
+def _connect(viewer: _Viewer) -> ViewerClient:
     """Return a connection to the viewer once it shows the whole log."""
     deadline = time.monotonic() + _START_TIMEOUT_S
     while time.monotonic() < deadline:
-        if process.poll() is not None:
-            raise _failure(process)
-        try:
-            client = ViewerClient.connect(url)
+        if viewer.process.poll() is not None:
+            raise viewer.failure()
+        with suppress(ConnectionError, RuntimeError):  # not listening yet
+            client = ViewerClient.connect(viewer.url)
             state = client.get_state()
-        except (ConnectionError, RuntimeError):  # not listening yet
-            time.sleep(_POLL_S)
-            continue
-        if state.views and not state.loading:
-            return client
+            if state.views and not state.loading:
+                return client
         time.sleep(_POLL_S)
     raise ConfigurationError(f"the viewer did not show the log within {_START_TIMEOUT_S:g} s")
-
-
-def _failure(process: subprocess.Popen[bytes]) -> ConfigurationError:
-    said = process.communicate()[1].decode(errors="replace")
-    if any(word in said.lower() for word in ("graphics adapter", "vulkan", "libx", "wgpu", "surface")):
-        return ConfigurationError(f"the viewer finds no graphics; on Debian or Ubuntu: apt-get install {_PACKAGES}")
-    return ConfigurationError(f"the viewer ended: {said.strip().splitlines()[-1] if said.strip() else 'it said nothing'}")
 
 
 def _take(client: ViewerClient, screenshot: Path) -> None:
