@@ -49,6 +49,7 @@ class KeyboardOperator:
     """
 
     Settings: ClassVar[type[Settings]] = KeyboardSettings
+    role: ClassVar[str] = "operator"
     real_time: ClassVar[bool] = True  # a person cannot be simulated faster than he types
 
     def __init__(self, settings: KeyboardSettings, setup: DeviceSetup, descriptor: int | None = None) -> None:

@@ -42,6 +42,7 @@ class RecordedDepthCamera:
     """
 
     Settings: ClassVar[type[Settings]] = RecordedDepthSettings
+    role: ClassVar[str] = "camera"
 
     def __init__(self, settings: RecordedDepthSettings, setup: DeviceSetup) -> None:
         """Remember; touch nothing."""

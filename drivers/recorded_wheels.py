@@ -42,6 +42,7 @@ class RecordedWheelBase:
     """
 
     Settings: ClassVar[type[Settings]] = RecordedWheelSettings
+    role: ClassVar[str] = "base"
 
     def __init__(self, settings: RecordedWheelSettings, setup: DeviceSetup) -> None:
         """Remember; the file is read when it is first needed."""

@@ -166,12 +166,18 @@ class _Reader:
             if key not in RobotCommon.model_fields and key not in DEVICES:
                 known = ", ".join([*RobotCommon.model_fields, *DEVICES])
                 raise ConfigurationError(f"{self._source}: unknown key 'robot.{key}'. Known: {known}")
-        devices = tuple(
-            (name, self._chosen(content, name, Part.DRIVER, NoCommon, None, key="driver", prefix="robot.").choice)
-            for name in DEVICES
-            if content.get(name) is not None
-        )
+        devices = tuple((name, self._device(content, name)) for name in DEVICES if content.get(name) is not None)
         return self._validate(RobotCommon, common, "robot"), devices
+
+    def _device(self, content: yaml_files.Mapping, role: str) -> Choice:
+        choice = self._chosen(content, role, Part.DRIVER, NoCommon, None, key="driver", prefix="robot.").choice
+        if choice.cls.role != role:
+            fitting = [name for name in registry.names(Part.DRIVER) if registry.load(Part.DRIVER, name).role == role]
+            raise ConfigurationError(
+                f"{self._source}: robot.{role}.driver: '{choice.name}' drives the {choice.cls.role}, not the {role}. "
+                f"Known for the {role}: {', '.join(fitting)}"
+            )
+        return choice
 
     def _chosen(
         self,

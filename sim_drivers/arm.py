@@ -48,6 +48,7 @@ class SimArm:
     """Position servos with gravity compensation, fed at 1 kHz by a `TrajectoryFollower`."""
 
     Settings: ClassVar[type[Settings]] = ArmSettings
+    role: ClassVar[str] = "arm"
     max_step_s = 0.001
     period_ns = 1_000_000
 

@@ -83,6 +83,7 @@ class SimDepthCamera(SimSensor[DepthFrame]):
     """A RealSense D455 in the simulated world: ray-cast depth with its intrinsics, noise, holes, range, latency."""
 
     Settings: ClassVar[type[Settings]] = DepthCameraSettings
+    role: ClassVar[str] = "camera"
 
     def __init__(self, settings: DepthCameraSettings, setup: DeviceSetup) -> None:
         """Register with the world.

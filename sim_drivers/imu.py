@@ -41,6 +41,7 @@ class SimImu(SimSensor[ImuSample]):
     """
 
     Settings: ClassVar[type[Settings]] = ImuSettings
+    role: ClassVar[str] = "imu"
 
     def __init__(self, settings: ImuSettings, setup: DeviceSetup) -> None:
         """Register with the world.

@@ -63,6 +63,7 @@ class SimOmniBase(WheeledBase):
     """A simulated three-wheel omni base, on ideal wheels or on rollers."""
 
     Settings: ClassVar[type[Settings]] = OmniBaseSettings
+    role: ClassVar[str] = "base"
 
     def __init__(self, settings: OmniBaseSettings, setup: DeviceSetup) -> None:
         """Join the world.

@@ -49,6 +49,7 @@ class SimRangeScanner(SimSensor[RangeScan]):
     """A planar range scanner in the simulated world: ray-cast ranges with noise, dropouts and latency."""
 
     Settings: ClassVar[type[Settings]] = RangeScannerSettings
+    role: ClassVar[str] = "scan"
 
     def __init__(self, settings: RangeScannerSettings, setup: DeviceSetup) -> None:
         """Register with the world.

@@ -70,6 +70,7 @@ class ScriptedOperator:
     """
 
     Settings: ClassVar[type[Settings]] = ScriptSettings
+    role: ClassVar[str] = "operator"
 
     def __init__(self, settings: ScriptSettings, setup: DeviceSetup) -> None:
         """Sort the script by time; events of the same time keep their order."""

@@ -132,6 +132,7 @@ class SimSkidSteerBase(WheeledBase):
     """A simulated four-wheel skid-steer base."""
 
     Settings: ClassVar[type[Settings]] = SkidSteerSettings
+    role: ClassVar[str] = "base"
 
     def __init__(self, settings: SkidSteerSettings, setup: DeviceSetup) -> None:
         """Join the world.

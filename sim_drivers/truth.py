@@ -35,6 +35,7 @@ class SimTruth(SimSensor[TruthSample]):
     """
 
     Settings: ClassVar[type[Settings]] = TruthSettings
+    role: ClassVar[str] = "truth"
     _newest: TruthSample | None
 
     def __init__(self, settings: TruthSettings, setup: DeviceSetup) -> None:

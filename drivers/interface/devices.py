@@ -64,11 +64,13 @@ class DeviceSetup:
 class Device(Protocol):
     """What every device can do.  A driver class is built as `Driver(settings, setup)`.
 
-    One that lives in real time (hardware, an emulated device, a person) sets the class attribute `real_time = True`; the
-    loop is then paced by the host's clock.
+    `role` is the name of the device it drives in a robot: camera, imu, base, arm, scan, operator or truth.  A driver that
+    lives in real time (hardware, an emulated device, a person) sets the class attribute `real_time = True`; the loop is then
+    paced by the host's clock.
     """
 
     Settings: ClassVar[type[Settings]]
+    role: ClassVar[str]
 
     def open(self) -> None:
         """Connect and start delivering.  Raises DeviceError with one sentence when it cannot."""
