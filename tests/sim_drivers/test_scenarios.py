@@ -1,14 +1,12 @@
 from functools import cache
-from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
-import yaml
 from pydantic import ValidationError
 
-import configs
 from drivers.interface.geometry import SE2
+from runtime import yaml_files
 from sim_drivers.scenario import Scenario
 from sim_drivers.scenarios.cluttered import Cluttered
 from sim_drivers.scenarios.corridor_crossing import CorridorCrossing
@@ -49,7 +47,7 @@ ROBOT_M, JACKAL_M, SENSING_M = 0.12, 0.34, 2.5
 
 @cache
 def build(config: str) -> Scenario:
-    world = yaml.safe_load((Path(configs.__file__).parent / "scenarios" / f"{config}.yaml").read_text())["world"]
+    world = yaml_files.read(yaml_files.find(config, "scenarios"), "scenarios")["world"]
     cls = SCENARIOS[world.pop("scenario")]
     return cls(cls.Settings(**world))
 
