@@ -2,7 +2,7 @@
 
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint bench wheel clean
+.PHONY: help demo picture test lint bench wheel clean
 
 STAMP := .venv/.stamp
 BIN := .venv/bin
@@ -17,6 +17,10 @@ help:  ## list the targets
 
 demo: $(STAMP)  ## drive the omni robot through the dynamic hallway and record it
 	$(BIN)/trundle run dynamic_hallway
+
+picture: $(STAMP)  ## make the README's picture (needs a Vulkan driver; a software one will do)
+	$(BIN)/trundle run dynamic_hallway --seed 1 --log runs/picture.rrd --force
+	$(BIN)/trundle review runs/picture.rrd --at 212 --screenshot docs/dynamic_hallway.png
 
 test: lint  ## what CI runs: format, lint, types, layers, tests
 	$(BIN)/python -m pytest -n 2

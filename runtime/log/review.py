@@ -20,7 +20,7 @@ from runtime.log.repair import quiet_environment, rerun_program
 WINDOW = "1920x1080"
 _START_TIMEOUT_S = 60.0
 _POLL_S = 0.2
-_SETTLE_S = 6.0  # until the viewer's notices about itself have faded and everything is drawn
+_SETTLE_S = 15.0  # until the viewer's notices about itself have faded and everything is drawn
 _PACKAGES = "mesa-vulkan-drivers libxkbcommon-x11-0 libxcursor1 libxi6 libxrandr2 libx11-xcb1"
 
 
