@@ -4,22 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from typing import TypeVar
 
 from drivers.interface.commands import Command
 from drivers.interface.devices import (
     Arm,
     DepthCamera,
     Device,
+    DeviceHealth,
+    DeviceState,
     Imu,
     MobileBase,
     Operator,
     RangeScanner,
     TruthSource,
 )
-from drivers.interface.errors import TrundleError
+from drivers.interface.errors import DeviceError, TrundleError
+from drivers.interface.samples import OperatorEvent
 from drivers.interface.sensed import Sensed, Tick
 from runtime.mission import MissionTracker
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,21 +40,26 @@ class Devices:
     operator: Operator | None = None
     truth: TruthSource | None = None
 
-    def __iter__(self) -> Iterator[Device]:
-        """Yield the devices that are there, in a fixed order."""
+    def __iter__(self) -> Iterator[tuple[str, Device]]:
+        """Yield the devices that are there with their names, in a fixed order."""
         for field in fields(self):
             device = getattr(self, field.name)
             if device is not None:
-                yield device
+                yield field.name, device
 
 
 class Robot:
-    """Opens, reads, commands, stops and closes all devices together."""
+    """Opens, reads, commands, stops and closes all devices together; what one of them does wrong, the others are spared.
+
+    A device that raises while the loop runs is reported as faulted in the health of the same tick's `Sensed` (of the next one's
+    where it failed to take a command), and the supervisor does the rest.
+    """
 
     def __init__(self, devices: Devices, mission: MissionTracker) -> None:
         """Take the devices, still closed."""
         self.devices = devices
         self._mission = mission
+        self._failures: dict[str, str] = {}  # what each device has raised since the last tick
 
     def open(self) -> None:
         """Open every device; when one cannot be opened, those that were are closed again.
@@ -57,51 +68,76 @@ class Robot:
             DeviceError: a device cannot be opened.
         """
         try:
-            for device in self.devices:
-                device.open()
-        except BaseException:
-            with suppress(TrundleError):
+            for name, device in self.devices:
+                try:
+                    device.open()
+                except Exception as error:
+                    raise _device_error(name, "open", error) from error
+        except BaseException:  # Ctrl-C too
+            with suppress(DeviceError):
                 self.close()
             raise
 
     def read(self, tick: Tick) -> Sensed:
-        """Return all samples since the last tick; never blocks."""
+        """Return all samples since the last tick; never blocks, never raises."""
         d = self.devices
-        events = d.operator.drain() if d.operator else ()
+        events: tuple[OperatorEvent, ...] = self._ask("operator", d.operator.drain, ()) if d.operator else ()
         return Sensed(
             tick=tick,
-            depth=d.camera.latest() if d.camera else None,
-            imu=d.imu.drain() if d.imu else (),
-            base=d.base.drain() if d.base else (),
-            joints=d.arm.drain() if d.arm else (),
-            scans=d.scan.drain() if d.scan else (),
+            depth=self._ask("camera", d.camera.latest, None) if d.camera else None,
+            imu=self._ask("imu", d.imu.drain, ()) if d.imu else (),
+            base=self._ask("base", d.base.drain, ()) if d.base else (),
+            joints=self._ask("arm", d.arm.drain, ()) if d.arm else (),
+            scans=self._ask("scan", d.scan.drain, ()) if d.scan else (),
             operator=events,
-            truth=d.truth.latest() if d.truth else None,
-            health=tuple(device.health() for device in d),
+            truth=self._ask("truth", d.truth.latest, None) if d.truth else None,
+            health=tuple(self._health(name, device) for name, device in d),
             mission=self._mission.fold(events),
         )
 
     def write(self, command: Command) -> None:
-        """Send each device its part of the command."""
-        if self.devices.base is not None and command.base is not None:
-            self.devices.base.command(command.base, command.expires_ns)
-        if self.devices.arm is not None and command.arm is not None:
-            self.devices.arm.command(command.arm, command.expires_ns)
+        """Send each device its part of the command; never raises."""
+        base, arm, expires_ns = self.devices.base, self.devices.arm, command.expires_ns
+        if base is not None and (twist := command.base) is not None:
+            self._ask("base", lambda: base.command(twist, expires_ns), None)
+        if arm is not None and (trajectory := command.arm) is not None:
+            self._ask("arm", lambda: arm.command(trajectory, expires_ns), None)
 
     def stop(self) -> None:
-        """Stop every device, also when one of them fails to.  Raises the first failure after all were asked."""
-        self._each(lambda device: device.stop())
+        """Stop every device, also when one of them fails to.  Raises the first failure, a DeviceError, after all were asked."""
+        self._each("stop", lambda device: device.stop())
 
     def close(self) -> None:
-        """Close every device, also when one of them fails to.  Raises the first failure after all were asked."""
-        self._each(lambda device: device.close())
+        """Close every device, also when one of them fails to.  Raises the first failure, a DeviceError, after all were asked."""
+        self._each("close", lambda device: device.close())
 
-    def _each(self, action: Callable[[Device], None]) -> None:
-        failures: list[Exception] = []
-        for device in self.devices:
+    def _ask(self, name: str, question: Callable[[], T], otherwise: T) -> T:
+        try:
+            return question()
+        except Exception as error:  # noqa: BLE001 - one broken device must neither end the loop nor hide the others
+            self._failures[name] = _sentence(error)
+            return otherwise
+
+    def _health(self, name: str, device: Device) -> DeviceHealth:
+        health = self._ask(name, device.health, DeviceHealth(name, DeviceState.FAULTED))
+        failure = self._failures.pop(name, "")
+        return replace(health, state=DeviceState.FAULTED, fault=failure) if failure else health
+
+    def _each(self, verb: str, action: Callable[[Device], None]) -> None:
+        failures: list[DeviceError] = []
+        for name, device in self.devices:
             try:
                 action(device)
             except Exception as error:  # noqa: BLE001 - one broken device must not keep the others from stopping
-                failures.append(error)
+                failures.append(_device_error(name, verb, error))
         if failures:
             raise failures[0]
+
+
+def _sentence(error: Exception) -> str:
+    return str(error) if isinstance(error, TrundleError) else f"{type(error).__name__}: {error}"
+
+
+def _device_error(name: str, verb: str, error: Exception) -> DeviceError:
+    """Return the device's own error, or one that says whose failure it was."""
+    return error if isinstance(error, DeviceError) else DeviceError(f"the {name} cannot {verb}: {_sentence(error)}")

@@ -23,7 +23,7 @@ class Fake:
 
     def _do(self, what: str) -> None:
         self.diary.append(f"{self.name} {what}")
-        if what == self.fails_at:
+        if self.fails_at and what.startswith(self.fails_at):
             raise DeviceError(f"{self.name} cannot {what}")
 
     def open(self) -> None:
@@ -39,13 +39,18 @@ class Fake:
         self._do(f"command {twist.vx} until {expires_ns}")
 
     def drain(self) -> tuple[()]:
-        return ()
+        return self._read("drain", ())
 
     def latest(self) -> None:
-        return None
+        return self._read("latest", None)
 
     def health(self) -> DeviceHealth:
-        return DeviceHealth(self.name, DeviceState.OPEN)
+        return self._read("health", DeviceHealth(self.name, DeviceState.OPEN))
+
+    def _read(self, what: str, answer: object) -> object:
+        if what == self.fails_at:
+            raise OSError(f"{self.name} has been unplugged")
+        return answer
 
 
 class Operating(Fake):
@@ -79,6 +84,35 @@ def test_a_new_goal_of_the_operator_replaces_the_mission_at_the_same_tick() -> N
     sensed = robot(diary, lambda name: Fake(name, diary)).read(Tick(0, 0, 1))
     assert sensed.mission.goals == (Goal(1.0, 2.0),)
     assert [health.device for health in sensed.health] == ["camera", "imu", "base", "operator"]
+
+
+def test_whatever_a_device_raises_when_it_is_opened_the_sentence_names_it() -> None:
+    class Odd(Fake):
+        def open(self) -> None:
+            raise ValueError("unsupported firmware")
+
+    diary: list[str] = []
+    with pytest.raises(DeviceError, match="the imu cannot open: ValueError: unsupported firmware"):
+        robot(diary, lambda name: (Odd if name == "imu" else Fake)(name, diary)).open()
+    assert "camera close" in diary
+
+
+@pytest.mark.parametrize(("broken", "what"), [("camera", "latest"), ("imu", "drain"), ("base", "drain"), ("base", "health")])
+def test_a_device_that_dies_is_a_fault_of_its_own_and_the_others_are_read(broken: str, what: str) -> None:
+    bundle = robot([], lambda name: Fake(name, [], what if name == broken else ""))
+    for _ in range(2):  # as long as it goes on
+        sensed = bundle.read(Tick(0, 0, 1))
+        states = {health.device: (health.state, health.fault) for health in sensed.health}
+        assert states.pop(broken) == (DeviceState.FAULTED, f"OSError: {broken} has been unplugged")
+        assert set(states.values()) == {(DeviceState.OPEN, "")}
+        assert len(sensed.operator) == 1
+
+
+def test_a_base_that_takes_no_command_is_faulted_at_the_next_tick() -> None:
+    bundle = robot([], lambda name: Fake(name, [], "command" if name == "base" else ""))
+    bundle.write(Command(BodyTwist(0.5, 0, 0), None, 7, 0))
+    faults = [[health.fault for health in bundle.read(Tick(k, 0, 1)).health] for k in range(2)]
+    assert faults == [["", "", "base cannot command 0.5 until 7", ""], ["", "", "", ""]]
 
 
 def test_only_what_is_commanded_is_written() -> None:
