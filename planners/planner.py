@@ -8,7 +8,7 @@ from typing import ClassVar, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.interface.commands import BaseLimits, BodyTwist, JointTrajectory
+from drivers.interface.commands import BaseLimits, BodyTwist, JointLimits, JointTrajectory
 from drivers.interface.settings import Settings
 from drivers.interface.stateful import Stateful
 from estimators.belief import Belief
@@ -28,6 +28,7 @@ class PlannerSetup:
     robot_radius_m: float
     limits: BaseLimits | None  # None: a robot without a base
     seed: int
+    arm_limits: JointLimits | None = None  # None: a robot without an arm
 
 
 @dataclass(frozen=True, slots=True)

@@ -79,14 +79,15 @@ def assemble(configuration: Configuration, seed: int) -> Assembly:
     radius_m = configuration.robot.radius_m
     limits = devices.base.limits if devices.base else None
     kinematics = devices.base.kinematics if devices.base else None
+    arm_limits = devices.arm.limits if devices.arm else None
 
     planning = configuration.planner
     estimator_setup = EstimatorSetup(period_s, radius_m, mission.mission.map_from_start, kinematics)
     plan_period_s = period_s * planning.common.period_ticks
-    planner = planning.choice.cls(planning.choice.settings, PlannerSetup(plan_period_s, radius_m, limits, seed))
+    planner = planning.choice.cls(planning.choice.settings, PlannerSetup(plan_period_s, radius_m, limits, seed, arm_limits))
     shield = configuration.shield.cls(configuration.shield.settings, ShieldSetup(period_s, radius_m, limits))
     budget_ns = configuration.loop.period_ns if planning.common.budget_ms is None else round(planning.common.budget_ms * 1e6)
-    supervisor_setup = SupervisorSetup(period_s, limits, budget_ns, devices.operator is not None)
+    supervisor_setup = SupervisorSetup(period_s, limits, budget_ns, devices.operator is not None, arm_limits)
     return Assembly(
         configuration=configuration,
         scene=scene,

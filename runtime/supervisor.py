@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from drivers.interface.commands import BaseLimits, BodyTwist, Command
+from drivers.interface.commands import BaseLimits, BodyTwist, Command, JointLimits, JointTrajectory
 from drivers.interface.sensed import Sensed
 from estimators.belief import Belief, EstimatorFault
 from planners.planner import Plan
@@ -28,6 +28,7 @@ class SupervisorSetup:
     limits: BaseLimits | None
     plan_budget_ns: int
     has_operator: bool
+    arm_limits: JointLimits | None = None  # None: a robot without an arm
 
 
 class Supervisor:
@@ -41,6 +42,7 @@ class Supervisor:
         self._board = board
         self._watch = DeviceWatch(settings)
         self._limiter = None if setup.limits is None else Limiter(setup.limits, setup.period_s)
+        self._arm_at_rest = None if setup.arm_limits is None else JointTrajectory.rest()
         self._operator = OperatorState(enabled=not setup.has_operator)
         self._latched: FaultReport | None = None
         self._misses = 0
@@ -99,15 +101,17 @@ class Supervisor:
         return self._limiter.reachable(self._motion, factor)
 
     def _asked(self, plan: Plan, belief: Belief, sensed: Sensed, reachable: ReachableSet) -> Command:
-        twist = plan.base
-        if self._operator.jog is not None:
-            twist = self._operator.jog.twist
+        twist, arm = plan.base, plan.arm
+        if self._operator.jog is not None:  # who drives by hand has the base to himself
+            twist, arm = self._operator.jog.twist, None
         if self._limiter is None:
             twist = None
         elif twist is None or not twist.finite:
             twist = BodyTwist()
         expires_ns = sensed.tick.start_ns + round(self._settings.command_lifetime_s * SECOND_NS)
-        return Command(None if twist is None else reachable.clip(twist), plan.arm, expires_ns, belief.oldest_input_ns)
+        if self._arm_at_rest is None or arm is None:
+            arm = self._arm_at_rest
+        return Command(None if twist is None else reachable.clip(twist), arm, expires_ns, belief.oldest_input_ns)
 
     def _shielded(self, asked: Command, belief: Belief, reachable: ReachableSet, faults: list[FaultReport]) -> Filtered | None:
         if worst(faults) not in {Response.RUN, Response.DECELERATE} or asked.base is None:
@@ -123,18 +127,34 @@ class Supervisor:
             return self._last
         if response is Response.RUN or response is Response.DECELERATE:
             return asked if filtered is None else filtered.command
-        stopping = None if self._limiter is None else self._limiter.stopping(self._motion)
-        return replace(asked, base=stopping, arm=None)
+        return self._stopping(asked)
 
     def _checked(self, command: Command, sensed: Sensed, faults: list[FaultReport]) -> Command:
-        """Assert, last before the wire: finite, inside the caps, not expired.  It repairs nothing; it stops."""
+        """Assert, last before the wire: finite, inside the limits, not expired.  It repairs nothing; it stops."""
+        wrong = self._wrong_with_base(command, sensed) or self._wrong_with_arm(command.arm)
+        if wrong is None:
+            return command
+        faults.append(wrong)
+        return self._stopping(command)
+
+    def _wrong_with_base(self, command: Command, sensed: Sensed) -> FaultReport | None:
         twist = command.base
         if twist is None or self._limiter is None:
-            return command
+            return None
         if twist.finite and self._limiter.within_caps(twist) and command.expires_ns > sensed.tick.start_ns:
-            return command
-        faults.append(FaultReport(Fault.COMMAND_OUT_OF_LIMITS, "supervisor", f"{twist} failed the last check"))
-        return replace(command, base=self._limiter.stopping(self._motion))
+            return None
+        return FaultReport(Fault.COMMAND_OUT_OF_LIMITS, "supervisor", f"{twist} failed the last check")
+
+    def _wrong_with_arm(self, trajectory: JointTrajectory | None) -> FaultReport | None:
+        limits = self._setup.arm_limits
+        if trajectory is None or limits is None or not (wrong := limits.fault_of(trajectory)):
+            return None
+        fault = Fault.COMMAND_OUT_OF_LIMITS if trajectory.finite else Fault.NON_FINITE_COMMAND
+        return FaultReport(fault, "planner", f"the arm's trajectory {wrong}")
+
+    def _stopping(self, command: Command) -> Command:
+        stopping = None if self._limiter is None else self._limiter.stopping(self._motion)
+        return replace(command, base=stopping, arm=self._arm_at_rest)
 
     def _remember(self, command: Command) -> None:
         if self._limiter is not None and command.base is not None:

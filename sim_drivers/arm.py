@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from drivers.interface.commands import JointTrajectory
+from drivers.interface.commands import JointLimits, JointTrajectory
 from drivers.interface.devices import DeviceHealth, DeviceSetup, DeviceState
 from drivers.interface.errors import DeviceError
 from drivers.interface.samples import JointSample, Stamp, frozen_array
 from drivers.interface.seeds import stream
 from drivers.interface.settings import Settings
 from sim_drivers.arm_model import LEAD_S, attach_panda, panda_joint
-from sim_drivers.arm_motion import JOINTS, PANDA, TrajectoryFollower, fault_of
+from sim_drivers.arm_motion import JOINTS, PANDA, TrajectoryFollower
 from sim_drivers.delivery import Delivery
 from sim_drivers.world import SECOND_NS, MujocoWorld, require_world
 
@@ -70,6 +70,11 @@ class SimArm:
         self._reset()
         self._world.add(self)
 
+    @property
+    def limits(self) -> JointLimits:
+        """What it may be asked."""
+        return PANDA
+
     def open(self) -> None:
         """Start delivering; counters and noise begin anew."""
         if self._state is not DeviceState.OPEN:
@@ -82,7 +87,7 @@ class SimArm:
         Raises:
             DeviceError: it cannot be followed (not finite, out of range, too fast, wrong shape), or the arm is not open.
         """
-        if fault := fault_of(trajectory, PANDA):
+        if fault := PANDA.fault_of(trajectory):
             raise DeviceError(f"{self._setup.name}: the trajectory {fault}")
         if self._state is not DeviceState.OPEN:
             raise DeviceError(f"{self._setup.name} is not open and takes no commands")
@@ -133,8 +138,8 @@ class SimArm:
     def act(self, world: MujocoWorld) -> None:
         """Move the set point on, and measure when it is time."""
         while self._pending and self._pending[0][0] <= world.now_ns:
-            applies_ns, trajectory, expires_ns = self._pending.pop(0)
-            self._follower.follow(trajectory, expires_ns, applies_ns)
+            _, trajectory, expires_ns = self._pending.pop(0)
+            self._follower.follow(trajectory, expires_ns)
         self._follower.step(world.now_ns)
         world.data.ctrl[self._ctrl] = self._follower.position_rad + LEAD_S * self._follower.velocity_rad_s
         if self._state is DeviceState.OPEN and world.now_ns >= self._next_ns:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from drivers.interface.commands import JointTrajectory
+from drivers.interface.commands import JointLimits, JointTrajectory
 
 F64 = NDArray[np.float64]
 
@@ -22,18 +20,6 @@ def _row(*values: float) -> F64:
     return np.array(values)
 
 
-@dataclass(frozen=True, slots=True)
-class JointLimits:
-    """What each joint may do, every field of shape (7,)."""
-
-    position_min_rad: F64
-    position_max_rad: F64
-    velocity_rad_s: F64
-    acceleration_rad_s2: F64
-    jerk_rad_s3: F64
-    torque_nm: F64
-
-
 # Franka Control Interface documentation, robot limits of the Panda.
 PANDA = JointLimits(
     position_min_rad=_row(-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973),
@@ -43,23 +29,6 @@ PANDA = JointLimits(
     jerk_rad_s3=_row(7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0),
     torque_nm=_row(87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0),
 )
-
-
-def fault_of(trajectory: JointTrajectory, limits: JointLimits) -> str:
-    """Return what is wrong with a trajectory as the end of a sentence, or nothing when it can be followed."""
-    time_s, position, velocity = trajectory.time_from_start_s, trajectory.position_rad, trajectory.velocity_rad_s
-    shape = (len(time_s), JOINTS)
-    if len(time_s) < 2 or position.shape != shape or velocity.shape != shape:
-        return f"needs at least two knots of {JOINTS} positions and velocities; got {position.shape} and {velocity.shape}"
-    if not (np.isfinite(time_s).all() and np.isfinite(position).all() and np.isfinite(velocity).all()):
-        return "is not finite"
-    if time_s[0] < 0.0 or (np.diff(time_s) <= 0.0).any():
-        return "has knot times that do not increase"
-    if (position < limits.position_min_rad).any() or (position > limits.position_max_rad).any():
-        return "leaves the joints' range"
-    if (np.abs(velocity) > limits.velocity_rad_s).any():
-        return "is faster than the joints' velocity limits"
-    return ""
 
 
 class TrajectoryFollower:
@@ -79,10 +48,13 @@ class TrajectoryFollower:
         self._start_ns = self._expires_ns = self._last_ns = 0
         self.expired = 0  # times the dead man had to act
 
-    def follow(self, trajectory: JointTrajectory, expires_ns: int, now_ns: int) -> None:
-        """Follow a trajectory whose clock starts now, until `expires_ns`."""
+    def follow(self, trajectory: JointTrajectory, expires_ns: int) -> None:
+        """Follow a trajectory until `expires_ns`; one without knots is an order to stop."""
+        if trajectory.is_rest:
+            self.stop()
+            return
         self._spline = CubicHermiteSpline(trajectory.time_from_start_s, trajectory.position_rad, trajectory.velocity_rad_s)
-        self._start_ns, self._expires_ns = now_ns, expires_ns
+        self._start_ns, self._expires_ns = trajectory.start_ns, expires_ns
 
     def stop(self) -> None:
         """Forget the trajectory and decelerate to rest."""

@@ -46,11 +46,65 @@ class BaseLimits:
 
 @dataclass(frozen=True, slots=True)
 class JointTrajectory:
-    """Knots that the arm's own 1 kHz process interpolates; it comes to rest at the last one."""
+    """Knots that the arm's own 1 kHz process interpolates; it comes to rest at the last one.  No knots: it comes to rest now.
 
+    Knot times count from `start_ns`, so the same trajectory sent again only lives longer; it does not begin anew.
+    """
+
+    start_ns: int  # on the loop's clock
     time_from_start_s: NDArray[np.float64]  # (knots,)
     position_rad: NDArray[np.float64]  # (knots, joints)
     velocity_rad_s: NDArray[np.float64]  # (knots, joints)
+
+    @classmethod
+    def rest(cls) -> JointTrajectory:
+        """Return the order to come to rest at once."""
+        return cls(0, np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)))
+
+    @property
+    def is_rest(self) -> bool:
+        """Whether this is the order to come to rest at once."""
+        return len(self.time_from_start_s) == 0
+
+    @property
+    def finite(self) -> bool:
+        """Whether every time, position and velocity is a finite number."""
+        parts = (self.time_from_start_s, self.position_rad, self.velocity_rad_s)
+        return all(bool(np.isfinite(part).all()) for part in parts)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointLimits:
+    """What each joint of an arm may be asked; every field has the shape (joints,)."""
+
+    position_min_rad: NDArray[np.float64]
+    position_max_rad: NDArray[np.float64]
+    velocity_rad_s: NDArray[np.float64]
+    acceleration_rad_s2: NDArray[np.float64]
+    jerk_rad_s3: NDArray[np.float64]
+    torque_nm: NDArray[np.float64]
+
+    def fault_of(self, trajectory: JointTrajectory) -> str:
+        """Return what is wrong with a trajectory as the end of a sentence, or nothing when it can be followed.
+
+        Only the knots are judged; between them the arm keeps its limits itself and follows late where it must.
+        """
+        if trajectory.is_rest:
+            return ""
+        time_s, position, velocity = trajectory.time_from_start_s, trajectory.position_rad, trajectory.velocity_rad_s
+        joints = len(self.velocity_rad_s)
+        shape = (len(time_s), joints)
+        if len(time_s) < 2 or position.shape != shape or velocity.shape != shape:
+            return f"needs at least two knots of {joints} positions and velocities; got {position.shape} and {velocity.shape}"
+        if not trajectory.finite:
+            return "is not finite"
+        if time_s[0] < 0.0 or (np.diff(time_s) <= 0.0).any():
+            return "has knot times that do not increase"
+        if (position < self.position_min_rad).any() or (position > self.position_max_rad).any():
+            return "leaves the joints' range"
+        if (np.abs(velocity) > self.velocity_rad_s).any():
+            return "is faster than the joints' velocity limits"
+        return ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, Protocol, runtime_checkable
 
-from drivers.interface.commands import BaseLimits, BodyTwist, JointTrajectory
+from drivers.interface.commands import BaseLimits, BodyTwist, JointLimits, JointTrajectory
 from drivers.interface.kinematics import WheelKinematics
 from drivers.interface.samples import (
     BaseSample,
@@ -143,8 +143,13 @@ class MobileBase(Device, Protocol):
 class Arm(Device, Protocol):
     """A serial arm that follows joint trajectories."""
 
+    @property
+    def limits(self) -> JointLimits:
+        """What it may be asked."""
+        ...
+
     def command(self, trajectory: JointTrajectory, expires_ns: int) -> None:
-        """Follow the trajectory until `expires_ns`, then decelerate to rest.  Raises DeviceError for non-finite knots."""
+        """Follow the trajectory until `expires_ns`, then decelerate to rest.  Raises DeviceError for one beyond its limits."""
         ...
 
     def drain(self) -> tuple[JointSample, ...]:

@@ -109,7 +109,7 @@ class Bench:
         self.wait(0.02)
         start = self.read()[-1].position_rad
         knots = np.stack((start, start + value * np.eye(len(start))[0]))
-        return JointTrajectory(np.array([0.0, 2.0]), knots, np.zeros_like(knots))
+        return JointTrajectory(self.world.now_ns, np.array([0.0, 2.0]), knots, np.zeros_like(knots))
 
     def command(self, order: BodyTwist | JointTrajectory, lifetime_s: float) -> None:
         self.device.command(order, self.world.now_ns + round(lifetime_s * 1e9))

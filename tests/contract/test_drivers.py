@@ -184,7 +184,7 @@ def test_health_says_what_was_delivered(tested):
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_refuses_what_is_not_finite(moving, bad):
     order = moving.order()
-    for name in (field.name for field in fields(order)):
+    for name in (field.name for field in fields(order) if field.type != "int"):
         with pytest.raises(DeviceError) as refusal:
             moving.command(replace(order, **{name: getattr(order, name) + bad}), lifetime_s=1.0)
         assert "tested" in str(refusal.value)

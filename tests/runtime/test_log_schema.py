@@ -49,7 +49,7 @@ def test_an_action_without_fields_is_told_from_the_others() -> None:
 
 def test_empty_and_missing_arrays_keep_their_shape() -> None:
     schema = Schema("/x", JointTrajectory | None)
-    trajectory = JointTrajectory(np.zeros(0), np.zeros((0, 7)), np.zeros((0, 7)))
+    trajectory = JointTrajectory(5, np.zeros(0), np.zeros((0, 7)), np.zeros((0, 7)))
     schema.put(None)
     schema.put(trajectory)
     assert schema.take(row(schema, 0)) is None

@@ -39,8 +39,8 @@ def make(seed=1, **settings):
     return world, arm
 
 
-def move(to=GOAL, seconds=1.5, start=READY):
-    return JointTrajectory(np.array([0.0, seconds]), np.stack((start, to)), np.zeros((2, 7)))
+def move(to=GOAL, seconds=1.5, start=READY, start_ns=0):
+    return JointTrajectory(start_ns, np.array([0.0, seconds]), np.stack((start, to)), np.zeros((2, 7)))
 
 
 def watch(world, milliseconds):
@@ -115,7 +115,7 @@ def test_passes_through_knots_with_their_velocity():
     world, arm = make()
     middle, velocity = READY + 0.2, np.full(7, 0.4)
     knots = np.stack((READY, middle, READY + 0.4))
-    arm.command(JointTrajectory(np.array([0.0, 0.8, 1.6]), knots, np.stack((0 * velocity, velocity, 0 * velocity))), 3000 * MS)
+    arm.command(JointTrajectory(0, np.array([0.0, 0.8, 1.6]), knots, np.stack((0 * velocity, velocity, 0 * velocity))), 3000 * MS)
     position, speed = watch(world, 802)
     np.testing.assert_allclose(position[-1], middle, atol=3e-3)
     np.testing.assert_allclose(speed[-1], velocity, atol=0.02)
@@ -171,10 +171,10 @@ def test_stop_and_close_work_before_everything():
     [
         (move(np.full(7, math.nan)), "not finite"),
         (move(READY + 3.0), "range"),
-        (JointTrajectory(np.array([0.0, 0.0]), np.stack((READY, GOAL)), np.zeros((2, 7))), "increase"),
-        (JointTrajectory(np.array([0.0, 1.0]), np.stack((READY, GOAL)), np.full((2, 7), 2.4)), "velocity limits"),
-        (JointTrajectory(np.array([0.0]), READY[None], np.zeros((1, 7))), "two knots"),
-        (JointTrajectory(np.array([0.0, 1.0]), np.zeros((2, 6)), np.zeros((2, 6))), "7 positions"),
+        (JointTrajectory(0, np.array([0.0, 0.0]), np.stack((READY, GOAL)), np.zeros((2, 7))), "increase"),
+        (JointTrajectory(0, np.array([0.0, 1.0]), np.stack((READY, GOAL)), np.full((2, 7), 2.4)), "velocity limits"),
+        (JointTrajectory(0, np.array([0.0]), READY[None], np.zeros((1, 7))), "two knots"),
+        (JointTrajectory(0, np.array([0.0, 1.0]), np.zeros((2, 6)), np.zeros((2, 6))), "7 positions"),
     ],
 )
 def test_refuses_what_cannot_be_followed(trajectory, message):
@@ -210,3 +210,26 @@ def test_rides_on_a_base_as_one_robot():
     assert np.abs(arm.drain()[-1].position_rad - GOAL).max() < 1e-3
     flange = world.data.body("base").xpos + np.array([0.1, 0.0, 0.4]) + flange_by_dh(GOAL)[:3, 3]
     np.testing.assert_allclose(world.data.body("arm_panda_link8").xpos, flange, atol=0.03)  # the base turned a little
+
+
+def test_the_order_to_rest_ends_a_trajectory_and_is_no_dead_mans_work():
+    world, arm = make()
+    arm.command(move(), 5000 * MS)
+    watch(world, 700)
+    arm.command(JointTrajectory.rest(), 5000 * MS)
+    _, velocity = watch(world, 500)
+    assert np.abs(velocity[-1]).max() < 1e-6
+    assert arm.health().expired_commands == 0
+
+
+def test_a_trajectory_begins_at_its_own_time_not_when_it_is_sent():
+    runs = []
+    for sent_ms in (range(0, 1900, 100), (0,)):
+        world, arm = make()
+        for at_ms in sent_ms:
+            world.step_to(at_ms * MS)
+            arm.command(move(start_ns=300 * MS), 3000 * MS)
+        world.step_to(1900 * MS)
+        runs.append(world.data.qpos.copy())
+    np.testing.assert_array_equal(*runs)
+    assert np.abs(runs[0] - GOAL).max() < 1e-3
