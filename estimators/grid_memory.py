@@ -17,19 +17,18 @@ from drivers.interface.geometry import SE2
 from drivers.interface.samples import frozen_array
 from drivers.interface.settings import Settings
 from drivers.interface.stateful import pack, unpack
-from estimators.belief import UNKNOWN, Lattice, OccupancyGrid
+from estimators.belief import OCCUPIED, UNKNOWN, Lattice, Mask, OccupancyGrid
 from estimators.labelling import FrameLabels
 from estimators.memory_kernels import fold, free_disc
-from estimators.rolling import lattice_around, transfer
+from estimators.rolling import lattice_around, strays, transfer
 
 NEVER_NS = -(2**62)
 SECOND_NS = 1_000_000_000
 
 
 class GridMemorySettings(Settings):
-    """How large the window is and how long occupied cells are believed unseen."""
+    """How long occupied cells are believed unseen."""
 
-    window_m: float = Field(default=6.0, gt=0.5, le=40.0, description="side of the square window around the robot")
     static_retention_s: float = Field(default=60.0, gt=0.0, le=3600.0, description="for what has always stood there")
     dynamic_retention_s: float = Field(default=0.5, gt=0.0, le=3600.0, description="for what came to stand where it was free")
     recently_free_s: float = Field(default=3.0, ge=0.0, le=3600.0, description="how long ago 'it was free' counts")
@@ -43,11 +42,11 @@ def _ns(seconds: float) -> int:
 class GridMemory:
     """The remembered grid; `merge` a frame, read `grid`."""
 
-    def __init__(self, settings: GridMemorySettings, cell_m: float, robot_radius_m: float) -> None:
+    def __init__(self, settings: GridMemorySettings, window_m: float, cell_m: float, robot_radius_m: float) -> None:
         """Start with everything unknown but the ground under the robot, at the origin of odom."""
         self._settings = settings
         self._radius_m = robot_radius_m
-        side = max(1, round(settings.window_m / cell_m))
+        side = max(1, round(window_m / cell_m))
         self._lattice = lattice_around(0.0, 0.0, cell_m, side, side)
         shape = (side, side)
         self._label = np.full(shape, UNKNOWN, dtype=np.uint8)
@@ -62,11 +61,14 @@ class GridMemory:
         """What is remembered now, as a copy."""
         return OccupancyGrid(self._lattice, frozen_array(self._label.copy()))
 
+    @property
+    def moving(self) -> Mask:
+        """Which cells of `grid` are occupied by something that came there lately, shape (rows, columns)."""
+        return np.asarray(self._dynamic & (self._label == OCCUPIED))
+
     def strays(self, odom_from_base: SE2) -> bool:
         """Tell whether the robot has come more than a quarter of the window away from the middle."""
-        half = 0.5 * self._lattice.rows * self._lattice.cell_m
-        x, y = self._lattice.x_m + half, self._lattice.y_m + half
-        return max(abs(odom_from_base.x - x), abs(odom_from_base.y - y)) > 0.5 * half
+        return strays(self._lattice, odom_from_base)
 
     def follow(self, odom_from_base: SE2) -> None:
         """Roll the window along, so that the robot stands in its middle cell, and free the ground under it."""

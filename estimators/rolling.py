@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.interface.geometry import SE2
 from estimators.belief import Lattice
 
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -40,3 +41,10 @@ def transfer(values: NDArray[Scalar], source: Lattice, target: Lattice, fill: An
     if rows[0] < rows[1] and columns[0] < columns[1]:
         moved[rows[0] - up : rows[1] - up, columns[0] - right : columns[1] - right] = values[slice(*rows), slice(*columns)]
     return moved
+
+
+def strays(window: Lattice, odom_from_base: SE2) -> bool:
+    """Tell whether a robot is more than a quarter of the square window away from its middle."""
+    half = 0.5 * window.rows * window.cell_m
+    x, y = window.x_m + half, window.y_m + half
+    return max(abs(odom_from_base.x - x), abs(odom_from_base.y - y)) > 0.5 * half

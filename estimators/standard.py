@@ -17,9 +17,9 @@ from estimators.clearance import ClearanceEstimator, ClearanceSettings
 from estimators.dead_reckoning import DeadReckoning, DeadReckoningSettings
 from estimators.depth_grid import DepthGrid, DepthGridSettings
 from estimators.estimator import EstimatorSetup
-from estimators.grid_memory import GridMemory, GridMemorySettings
 from estimators.joint_state import pack_joints, unpack_joints
 from estimators.labelling import FrameLabels, FrameSource
+from estimators.memory import MemorySettings, memory_of
 from estimators.odometry import Odometry, OdometryEstimate, latest_valid_ns
 from estimators.scan_grid import ScanGrid, ScanGridSettings
 from estimators.truth_odometry import TruthOdometry
@@ -36,7 +36,7 @@ class StandardSettings(Settings):
     odometry: DeadReckoningSettings = DeadReckoningSettings()
     depth: DepthGridSettings = DepthGridSettings()
     scan: ScanGridSettings = ScanGridSettings()
-    memory: GridMemorySettings = GridMemorySettings()
+    memory: MemorySettings = MemorySettings()
     clearance: ClearanceSettings = ClearanceSettings()
 
 
@@ -56,7 +56,7 @@ class StandardEstimator:
         self._source: FrameSource = (
             DepthGrid(settings.depth, settings.cell_m) if settings.source == "depth" else ScanGrid(settings.scan, settings.cell_m)
         )
-        self._memory = GridMemory(settings.memory, settings.cell_m, setup.robot_radius_m)
+        self._memory = memory_of(settings.memory, settings.cell_m, setup.robot_radius_m)
         self._clearance = ClearanceEstimator(settings.clearance)
         self._grid = self._memory.grid
         self._frame_ns: int | None = None  # capture time of the newest frame used
@@ -65,7 +65,7 @@ class StandardEstimator:
     def warm_up(self) -> None:
         """Compile every kernel; what is believed stays as it is."""
         self._source.warm_up()
-        spare = GridMemory(self._settings.memory, self._settings.cell_m, self._setup.robot_radius_m)
+        spare = memory_of(self._settings.memory, self._settings.cell_m, self._setup.robot_radius_m)
         spare.merge(FrameLabels(spare.grid, spare.grid.label == FREE), 0, SE2())
 
     def update(self, sensed: Sensed) -> Belief:

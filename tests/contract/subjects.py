@@ -17,7 +17,11 @@ from tests.contract.streams import BASES, MISSION, PERIOD_S, RADIUS_M, Stream, b
 
 # Settings under which a part is another one; every name is also tried with its defaults.
 VARIANTS: dict[str, tuple[dict[str, Any], ...]] = {
-    "standard": ({"source": "scan", "odometry": {"use_gyro": True}}, {"pose": "truth", "tracks": "truth"}),
+    "standard": (
+        {"source": "scan", "odometry": {"use_gyro": True}},
+        {"pose": "truth", "tracks": "truth"},
+        {"memory": {"kind": "layers"}},
+    ),
 }
 NAN, INF = math.nan, math.inf
 ASKS = (

@@ -16,7 +16,7 @@ RETENTION = {"static_retention_s": 10.0, "dynamic_retention_s": 1.0, "recently_f
 
 
 def memory(**settings):
-    return GridMemory(GridMemorySettings(window_m=3.0, **{**RETENTION, **settings}), CELL_M, robot_radius_m=0.12)
+    return GridMemory(GridMemorySettings(**{**RETENTION, **settings}), 3.0, CELL_M, robot_radius_m=0.12)
 
 
 def frame_of(cells, blind=(), x=0.0, y=0.0, side=41):
