@@ -25,6 +25,7 @@ from drivers.interface.sensed import Sensed
 from drivers.interface.settings import Settings
 from estimators.belief import F64, U8, Mask
 from estimators.depth_kernels import collect_depth, outline_blind
+from estimators.grid_filter import GridFilterSettings
 from estimators.labelling import FrameLabels, label_frame, lattice_in_reach
 
 SATURATED = 65_535  # what an overflowing depth value is clipped to; not a measurement
@@ -41,6 +42,8 @@ class DepthGridSettings(Settings):
     depth_max_m: float = Field(default=20.0, gt=0.2, le=65.0, description="depths beyond are outliers and say nothing")
     hits_min: int = Field(default=2, ge=1, le=1000, description="returns that make a cell occupied")
     component_cells_min: int = Field(default=2, ge=1, le=100, description="smaller groups of occupied cells are noise")
+    filtered: bool = Field(default=False, description="whether far labels are filtered (appendix D.3, step 7)")
+    filter: GridFilterSettings = GridFilterSettings()
 
 
 def is_sound(frame: DepthFrame) -> bool:

@@ -17,6 +17,7 @@ from estimators.clearance import ClearanceEstimator, ClearanceSettings
 from estimators.dead_reckoning import DeadReckoning, DeadReckoningSettings
 from estimators.depth_grid import DepthGrid, DepthGridSettings
 from estimators.estimator import EstimatorSetup
+from estimators.grid_filter import GridFilter
 from estimators.joint_state import pack_joints, unpack_joints
 from estimators.labelling import FrameLabels, FrameSource
 from estimators.memory import MemorySettings, memory_of
@@ -56,6 +57,8 @@ class StandardEstimator:
         self._source: FrameSource = (
             DepthGrid(settings.depth, settings.cell_m) if settings.source == "depth" else ScanGrid(settings.scan, settings.cell_m)
         )
+        filtered = settings.source == "depth" and settings.depth.filtered
+        self._filter = GridFilter(settings.depth.filter, settings.cell_m) if filtered else None
         self._memory = memory_of(settings.memory, settings.cell_m, setup.robot_radius_m)
         self._clearance = ClearanceEstimator(settings.clearance)
         self._grid = self._memory.grid
@@ -91,6 +94,8 @@ class StandardEstimator:
         frame = self._source.see(sensed, pose)
         if frame is None:
             return False
+        if self._filter is not None:
+            frame = self._filter.apply(frame, captured_ns)
         self._memory.merge(frame, captured_ns, pose)
         self._frame_ns = captured_ns
         self._refresh(captured_ns)
@@ -130,6 +135,7 @@ class StandardEstimator:
         """Return the whole state."""
         return pack(
             odometry=np.frombuffer(self._odometry.snapshot(), dtype=np.uint8),
+            filter=np.frombuffer(b"" if self._filter is None else self._filter.snapshot(), dtype=np.uint8),
             memory=np.frombuffer(self._memory.snapshot(), dtype=np.uint8),
             clearance=np.frombuffer(self._clearance.snapshot(), dtype=np.uint8),
             frame_ns=np.array([] if self._frame_ns is None else [self._frame_ns], dtype=np.int64),
@@ -140,6 +146,8 @@ class StandardEstimator:
         """Take over a state."""
         state = unpack(snapshot)
         self._odometry.restore(state["odometry"].tobytes())
+        if self._filter is not None:
+            self._filter.restore(state["filter"].tobytes())
         self._memory.restore(state["memory"].tobytes())
         self._clearance.restore(state["clearance"].tobytes())
         self._grid = self._memory.grid

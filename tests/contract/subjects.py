@@ -20,7 +20,7 @@ VARIANTS: dict[str, tuple[dict[str, Any], ...]] = {
     "standard": (
         {"source": "scan", "odometry": {"use_gyro": True}},
         {"pose": "truth", "tracks": "truth"},
-        {"memory": {"kind": "layers"}},
+        {"memory": {"kind": "layers"}, "depth": {"filtered": True}},
     ),
 }
 NAN, INF = math.nan, math.inf
