@@ -7,6 +7,8 @@ Source: Cui, Deng, Wang, appendix D.3, step 7.  What differs:
 - Near the sensor the labels stay as they are.  Smoothing takes frames to believe in a new obstacle and opening removes thin
   ones, and what lingers would be a phantom; both are for far returns, where noise is, and not for what must be braked for.
 - What the filter takes away is unknown, not free: a return was there.
+- Walls are one cell thick, since nothing is seen behind a surface.  In the median what is unknown counts as half, or it would
+  take away every wall; opening would do so as well and has a radius of 0 by default.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ from estimators.rolling import transfer
 
 PAPER_FRAME_NS = 1_000_000_000 / 30
 NEVER_NS = -(2**62)
+HALF, YES = 1, 2  # votes in the median
 
 
 class GridFilterSettings(Settings):
@@ -61,14 +64,16 @@ class GridFilter:
         before = transfer(self._probability, self._lattice, lattice, 0.0)
         self._probability = np.asarray(kept * before + (1.0 - kept) * (raw == OCCUPIED), dtype=np.float32)
         self._lattice, self._stamp_ns = lattice, stamp_ns
-        occupied = self._smooth((self._probability > 0.5).astype(np.uint8)) != 0
+        occupied = self._smooth(self._probability > 0.5, raw == UNKNOWN) != 0
         label = np.where(occupied, OCCUPIED, np.where(raw == OCCUPIED, UNKNOWN, raw)).astype(np.uint8)
         near = self._near(lattice)
         label[near] = raw[near]
         return FrameLabels(OccupancyGrid(lattice, frozen_array(label)), frame.blind)
 
-    def _smooth(self, occupied: U8) -> U8:
-        smoothed = cv2.medianBlur(occupied, self._median)
+    def _smooth(self, occupied: Mask, unknown: Mask) -> U8:
+        votes = np.where(occupied, YES, np.where(unknown, HALF, 0)).astype(np.uint8)
+        median = cv2.medianBlur(votes, self._median)
+        smoothed = ((median == YES) | (occupied & (median == HALF))).astype(np.uint8)
         smoothed = cv2.morphologyEx(smoothed, cv2.MORPH_OPEN, self._opening)
         return np.asarray(cv2.morphologyEx(smoothed, cv2.MORPH_CLOSE, self._closing), dtype=np.uint8)
 

@@ -70,6 +70,13 @@ def test_median_and_opening_remove_specks_and_closing_fills_gaps():
     assert at(filter_of(closing_radius_m=0.05).apply(frame_of(holed), 0), *gap) == OCCUPIED
 
 
+def test_the_median_keeps_a_wall_of_one_cell_with_nothing_known_behind():
+    wall = {(2.22, y): OCCUPIED for y in np.arange(-0.475, 0.5, CELL_M)}
+    behind = {(x, y): UNKNOWN for y in np.arange(-0.475, 0.5, CELL_M) for x in (2.27, 2.32, 2.37)}
+    seen = filter_of(median_radius_m=0.05).apply(frame_of(wall | behind), 0)
+    assert [at(seen, 2.22, y) for y in np.arange(-0.4, 0.45, CELL_M)] == [OCCUPIED] * 17
+
+
 FILTERS = st.builds(
     GridFilterSettings,
     temporal_retention=st.floats(0.0, 0.99),
