@@ -84,8 +84,8 @@ def assemble(configuration: Configuration, seed: int) -> Assembly:
     planning = configuration.planner
     estimator_setup = EstimatorSetup(period_s, radius_m, mission.mission.map_from_start, kinematics)
     plan_period_s = period_s * planning.common.period_ticks
-    planner = planning.choice.cls(planning.choice.settings, PlannerSetup(plan_period_s, radius_m, limits, seed, arm_limits))
-    shield = configuration.shield.cls(configuration.shield.settings, ShieldSetup(period_s, radius_m, limits))
+    planner = planning.choice.build(PlannerSetup(plan_period_s, radius_m, limits, seed, arm_limits))
+    shield = configuration.shield.build(ShieldSetup(period_s, radius_m, limits))
     budget_ns = configuration.loop.period_ns if planning.common.budget_ms is None else round(planning.common.budget_ms * 1e6)
     supervisor_setup = SupervisorSetup(period_s, limits, budget_ns, devices.operator is not None, arm_limits)
     return Assembly(
@@ -97,8 +97,8 @@ def assemble(configuration: Configuration, seed: int) -> Assembly:
         robot=Robot(devices, mission),
         mission=mission,
         time_limit_s=_time_limit(configuration, scene),
-        estimator=configuration.estimator.cls(configuration.estimator.settings, estimator_setup),
-        router=configuration.router.cls(configuration.router.settings, RouterSetup(period_s, radius_m)),
+        estimator=configuration.estimator.build(estimator_setup),
+        router=configuration.router.build(RouterSetup(period_s, radius_m)),
         planner=planner,
         runner=PlannerRunner(
             planner,
@@ -116,8 +116,7 @@ def assemble(configuration: Configuration, seed: int) -> Assembly:
 def _scene(configuration: Configuration, seed: int) -> Scene | None:
     if configuration.world is None:
         return None
-    choice = configuration.world.choice
-    scene: Scene = choice.cls(choice.settings).draw(seed)
+    scene: Scene = configuration.world.choice.build().draw(seed)
     start = configuration.mission.start
     return scene if start is None else replace(scene, map_from_start=SE2(start.x_m, start.y_m, start.yaw_rad))
 
@@ -130,8 +129,7 @@ def _devices(configuration: Configuration, seed: int, world: MujocoWorld | None)
 
     built: dict[str, Any] = {}
     for name, choice in configuration.devices:
-        setup = DeviceSetup(name, seed, now_ns, world)
-        built[name] = choice.cls(choice.settings, setup)
+        built[name] = choice.build(DeviceSetup(name, seed, now_ns, world))
     # A driver that lives in real time (a device, a keyboard) says so with a class attribute.
     live = [name for name, choice in configuration.devices if getattr(choice.cls, "real_time", False)]
     realtime = configuration.loop.realtime or bool(live)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
+import signal
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -14,7 +16,7 @@ from rich.table import Table
 
 from drivers.interface.errors import ConfigurationError, TrundleError
 from runtime import registry, yaml_files
-from runtime.report import write_text
+from runtime.outputs import log_path, require_writable, write_text
 
 app = typer.Typer(
     name="trundle",
@@ -39,7 +41,7 @@ def run(
     config: Config,
     changes: Annotated[list[str] | None, typer.Option("--set", metavar="a.b=c", help="override a value; repeatable")] = None,
     seed: Annotated[int, typer.Option(min=0, help="seed of everything that is drawn")] = 0,
-    duration: Annotated[float | None, typer.Option(min=0.0, help="end after so many seconds of the run's time")] = None,
+    duration: Annotated[float | None, typer.Option(metavar="SECONDS", help="end after so much of the run's time")] = None,
     realtime: Annotated[bool, typer.Option("--realtime", help="pace a simulated world by the host's clock")] = False,
     live: Annotated[bool, typer.Option("--live", help="also stream to a Rerun viewer on loopback")] = False,
     log: Annotated[Path | None, typer.Option(help="where to record; default: a new file in runs/")] = None,
@@ -51,15 +53,17 @@ def run(
     # Imported here: `trundle list` and `--help` must not wait for MuJoCo, numba and Rerun.
     import runtime.run as running  # noqa: PLC0415
     from runtime import configuration  # noqa: PLC0415
-    from runtime.log_path import log_path  # noqa: PLC0415
     from runtime.progress import RunProgress  # noqa: PLC0415
 
     overrides = [*(changes or ())]
     if realtime:
         overrides.append("loop.realtime=true")
     if duration is not None:
+        if not 0.0 < duration < math.inf:
+            raise ConfigurationError(f"--duration takes seconds, more than 0 and finite, not {duration:g}")
         overrides.append(f"mission.time_limit_s={duration}")
     loaded = configuration.load(config, tuple(overrides))
+    require_writable(json, "--json")
     path = None if no_log else log_path(log, f"{loaded.scenario}-{loaded.planner.choice.name}-{seed}", force=force)
     with RunProgress(console, loaded.scenario) as progress:
         options = running.RunOptions(seed, path, live, progress.update, progress.ready)
@@ -67,7 +71,7 @@ def run(
     console.print(result.report.table())
     if json is not None:
         result.report.write(json)
-    if result.failure is not None and not isinstance(result.failure, KeyboardInterrupt):
+    if isinstance(result.failure, Exception):
         raise result.failure
     raise typer.Exit(running.exit_code(result))
 
@@ -86,6 +90,8 @@ def evaluate(
     from runtime import experiment_table  # noqa: PLC0415
 
     loaded = experiments.load_experiment(experiment)
+    require_writable(json, "--json")
+    require_writable(markdown, "--markdown")
     todo = experiments.cases(loaded, seeds, tuple(changes or ()))
     with Progress(console=console) as progress:
         task = progress.add_task(loaded.title, total=len(todo))
@@ -128,6 +134,7 @@ def review(
 
 def main() -> None:
     """Run the command line and exit with its code."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # being asked to end is Ctrl-C, whoever asks
     sys.exit(run_command(sys.argv[1:]))
 
 
@@ -137,16 +144,23 @@ def run_command(arguments: list[str]) -> int:
     plain = [argument for argument in arguments if argument != "--debug"]  # it may stand anywhere
     try:
         code = typer.main.get_command(app).main(plain, prog_name="trundle", standalone_mode=False)
-    except TrundleError as error:
-        if debug:
-            raise
-        errors.print(f"error: {error}", style="red", markup=False, highlight=False)
-        return error.exit_code
-    except typer.TyperException as error:  # wrong usage
-        if error.format_message():  # empty where the help was printed instead
-            errors.print(f"error: {error.format_message()}", style="red", markup=False, highlight=False)
-        return ConfigurationError.exit_code
     except (typer.Abort, KeyboardInterrupt):
         errors.print("interrupted", style="red")
         return 130
+    except typer.TyperException as error:  # wrong usage
+        if error.format_message():  # empty where the help was printed instead
+            _complain(error.format_message())
+        return ConfigurationError.exit_code
+    except Exception as error:
+        if debug:
+            raise
+        if isinstance(error, TrundleError):
+            _complain(str(error))
+            return error.exit_code
+        _complain(f"{type(error).__name__}: {error} (--debug shows where)")  # somebody's part is broken
+        return TrundleError.exit_code
     return code if isinstance(code, int) else 0
+
+
+def _complain(sentence: str) -> None:
+    errors.print(f"error: {sentence}", style="red", markup=False, highlight=False)

@@ -13,7 +13,7 @@ from typing import Any, Generic, TypeVar
 import yaml
 from pydantic import Field, ValidationError
 
-from drivers.interface.errors import ConfigurationError
+from drivers.interface.errors import ConfigurationError, TrundleError
 from drivers.interface.settings import Settings
 from runtime import registry, yaml_files
 from runtime.log.settings import LogSettings
@@ -30,8 +30,21 @@ class Choice:
     """A part chosen by name, with its validated settings."""
 
     name: str
-    cls: Any  # the registered class, built as cls(settings, setup)
+    cls: Any  # the registered class
     settings: Settings
+
+    def build(self, *setup: object) -> Any:
+        """Return `cls(settings, *setup)`.
+
+        Raises:
+            ConfigurationError: the part does not fit, or its constructor failed.
+        """
+        try:
+            return self.cls(self.settings, *setup)
+        except TrundleError:
+            raise
+        except Exception as error:
+            raise ConfigurationError(f"'{self.name}' cannot be built: {type(error).__name__}: {error}") from error
 
 
 @dataclass(frozen=True, slots=True)

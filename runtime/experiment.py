@@ -13,6 +13,7 @@ from pydantic import Field, ValidationError
 from drivers.interface.errors import ConfigurationError
 from drivers.interface.settings import Settings
 from runtime import yaml_files
+from runtime.referee import Outcome
 from runtime.report import RunReport
 
 
@@ -63,6 +64,8 @@ def run_case(case: Case) -> RunReport:
     result = run.run(configuration.load(case.configuration, case.overrides), run.RunOptions(seed=case.seed))
     if result.failure is not None:
         raise result.failure
+    if result.report.outcome == Outcome.INTERRUPTED.value:
+        raise KeyboardInterrupt  # Ctrl-C means the experiment, not one of its runs
     return result.report
 
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 
 from estimators.belief import Belief
 from planners.planner import Plan, Planner
 from planners.router import Route
+from runtime.background import Background
 from runtime.fault_board import FaultBoard
 from runtime.faults import Fault, FaultReport
-from runtime.guards import report
+from runtime.guards import checked, report
 
 NO_PLAN = Plan(base=None)
 
@@ -32,23 +33,23 @@ class PlannerRunner:
         self._next_tick = 0
         self._plan = NO_PLAN
         self._pending: tuple[int, Future[Plan]] | None = None
-        self._pool = ThreadPoolExecutor(1, "planner") if latency_ticks else None
+        self._background = Background[Plan]("planner") if latency_ticks else None
 
     def plan(self, belief: Belief, route: Route) -> Plan:
         """Return the plan in force at this tick."""
         self._collect(belief.tick)
         if belief.tick >= self._next_tick and self._pending is None:
             self._next_tick = belief.tick + self._period
-            if self._pool is None:
+            if self._background is None:
                 self._plan = self._guarded(lambda: self._planner.plan(belief, route))
             else:
-                self._pending = belief.tick + self._latency, self._pool.submit(self._planner.plan, belief, route)
+                self._pending = belief.tick + self._latency, self._background.submit(lambda: self._planner.plan(belief, route))
         return self._plan
 
     def close(self) -> None:
         """Let go of the background thread without waiting for a planner that hangs."""
-        if self._pool is not None:
-            self._pool.shutdown(wait=False, cancel_futures=True)
+        if self._background is not None:
+            self._background.close()
 
     def _collect(self, tick: int) -> None:
         if self._pending is None or tick < self._pending[0]:
@@ -63,7 +64,7 @@ class PlannerRunner:
 
     def _guarded(self, call: Callable[[], Plan]) -> Plan:
         try:
-            return call()
+            return checked(call(), Plan)
         except Exception as error:  # noqa: BLE001 - a planner is anyone's code; its failure must stop the robot, not the loop
             self._board.post(report(error, Fault.PLANNER_RAISED, "planner"))
             return NO_PLAN

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import enum
 import math
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -29,6 +28,15 @@ class Outcome(enum.Enum):
 
 
 @dataclass(slots=True)
+class FaultTally:
+    """One fault of one device, over the run."""
+
+    first_tick: int
+    first: FaultReport
+    ticks: int = 0  # on which it was present
+
+
+@dataclass(slots=True)
 class Tally:
     """What a run cost, so far."""
 
@@ -39,8 +47,7 @@ class Tally:
     min_clearance_m: float = math.inf
     odometry_error_m: float = math.nan
     odometry_error_rad: float = math.nan
-    faults: Counter[Fault] = field(default_factory=Counter)  # ticks on which each was present
-    first: dict[Fault, tuple[int, FaultReport]] = field(default_factory=dict)  # tick it was first present
+    faults: dict[tuple[Fault, str], FaultTally] = field(default_factory=dict)  # by fault and device, as first seen
 
     @property
     def duration_s(self) -> float:
@@ -115,7 +122,6 @@ class Referee:
         if self._last_pose is not None:
             tally.path_length_m += self._last_pose.distance(pose)
         self._last_pose = pose
-        for fault in sorted({report.fault for report in cycle.verdict.faults} - STATES_NOT_FAULTS, key=lambda f: f.value):
-            tally.faults[fault] += 1
-            report = next(report for report in cycle.verdict.faults if report.fault is fault)
-            tally.first.setdefault(fault, (tick.index, report))
+        for report in cycle.verdict.faults:
+            if report.fault not in STATES_NOT_FAULTS:
+                tally.faults.setdefault((report.fault, report.device), FaultTally(tick.index, report)).ticks += 1

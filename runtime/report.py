@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.table import Table
 
-from drivers.interface.errors import ConfigurationError
 from runtime.cycle import STAGES
+from runtime.outputs import write_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,18 +98,13 @@ class RunReport:
             rows.append((fault.fault, f"{fault.ticks} ticks, first at {fault.first_tick}: {where}{fault.detail}"))
         rows += [("not granted", sentence) for sentence in self.realtime_refused]
         if self.recording is not None:
-            rows.append(("recording", f"{self.recording.path} ({self.recording.bytes / 1e6:.1f} MB)"))
+            size = f"{self.recording.path} ({self.recording.bytes / 1e6:.1f} MB)"
+            rows.append(("recording", f"{size}; {self.recording.fault}" if self.recording.fault else size))
+        if self.error:
+            rows.append(("ended by", self.error))
         for name, value in rows:
             table.add_row(name, value)
         return table
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a result that the user asked for.  Raises ConfigurationError when the path cannot be written."""
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ConfigurationError(f"{path} cannot be written: {error.strerror}") from error
 
 
 def stage_times(history_ns: NDArray[np.int64]) -> dict[str, StageTime]:

@@ -8,14 +8,14 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from drivers.interface.errors import TrundleError
+from drivers.interface.errors import DeviceError, TrundleError
 from runtime.assembly import Assembly, assemble
 from runtime.configuration import Configuration
 from runtime.cycle import Cycle
 from runtime.fault_board import FaultBoard
 from runtime.faults import Fault, FaultReport
 from runtime.guards import guarded_route, guarded_update
-from runtime.interrupt import interruptible
+from runtime.interrupt import Interrupts, Phase, interruptible
 from runtime.log.recorder import Recorder, RecorderReport
 from runtime.loop import Stages, run_loop
 from runtime.pacer import Pacer
@@ -53,50 +53,57 @@ def run(configuration: Configuration, options: RunOptions) -> RunResult:
     Raises:
         ConfigurationError: parts do not fit together; nothing was opened.
         DeviceError: a device cannot be opened; everything is closed again.
+        KeyboardInterrupt: Ctrl-C or SIGTERM before the first tick; everything is closed again.
     """
-    assembly = assemble(configuration, options.seed)
-    assembly.warm_up()
-    recorder = Recorder(
-        options.log, configuration.log, run_header(assembly, options.seed), lockstep=assembly.lockstep, live=options.live
-    )
-    return _Run(assembly, options, recorder).result()
+    with interruptible() as interrupts:
+        assembly = assemble(configuration, options.seed)
+        assembly.warm_up()
+        recorder = Recorder(
+            options.log, configuration.log, run_header(assembly, options.seed), lockstep=assembly.lockstep, live=options.live
+        )
+        return _Run(assembly, options, recorder, interrupts).result()
 
 
 class _Run:
     """One run; its methods are its phases."""
 
-    def __init__(self, assembly: Assembly, options: RunOptions, recorder: Recorder) -> None:
+    def __init__(self, assembly: Assembly, options: RunOptions, recorder: Recorder, interrupts: Interrupts) -> None:
         self._assembly = assembly
         self._options = options
         self._recorder = recorder
+        self._interrupts = interrupts
         self._stopwatch = Stopwatch()
         self._refused: tuple[str, ...] = ()
         self._wall_s = 0.0
 
     def result(self) -> RunResult:
+        robot, interrupts = self._assembly.robot, self._interrupts
         failure: BaseException | None = None
-        with ExitStack() as closing, interruptible() as interrupted:
-            referee = self._referee(interrupted)
+        with ExitStack() as closing:
             closing.callback(self._assembly.runner.close)
-            self._recorder.open()
             closing.callback(self._recorder.close)
-            self._assembly.robot.open()
-            closing.callback(self._assembly.robot.close)
-            pacer = self._assembly.pacer()
+            self._recorder.open()
+            robot.open()
+            interrupts.phase = Phase.DRIVING
+            pacer, referee = self._assembly.pacer(), self._referee()
             try:
                 self._drive(pacer, referee)
-            except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - the report must be made; it is raised after that
+            except BaseException as error:  # noqa: BLE001 - the report must be made; it is raised after that
                 failure = error
-            finally:
-                self._assembly.robot.stop()
+            interrupts.phase = Phase.CLOSING
+            for end in (robot.stop, robot.close):
+                try:
+                    end()
+                except DeviceError as error:
+                    failure = failure or error
         return RunResult(self._report(pacer, referee, self._recorder.close(), failure), failure)
 
-    def _referee(self, interrupted: Callable[[], bool]) -> Referee:
+    def _referee(self) -> Referee:
         return Referee(
             self._assembly.mission,
             time_limit_s=self._assembly.time_limit_s,
             give_up_after_s=self._assembly.configuration.supervisor.give_up_after_s,
-            interrupted=interrupted,
+            interrupted=lambda: self._interrupts.asked,
             progress=self._options.progress,
         )
 
@@ -140,18 +147,24 @@ class _Run:
             odometry_error_rad=finite_or_none(tally.odometry_error_rad),
             stage_ms=stage_times(self._stopwatch.history_ns),
             faults=tuple(
-                FaultCount(fault.value, ticks, tally.first[fault][0], tally.first[fault][1].device, tally.first[fault][1].detail)
-                for fault, ticks in tally.faults.items()
+                FaultCount(fault.value, count.ticks, count.first_tick, device, count.first.detail)
+                for (fault, device), count in tally.faults.items()
             ),
             realtime_factor=factor,
             realtime_void=not assembly.lockstep and assembly.world is not None and self._fell_behind(factor),
             realtime_refused=self._refused,
             recording=_figures(self._options.log, recorded, tally.duration_s),
-            error="" if failure is None else f"{type(failure).__name__}: {failure}",
+            error=_error(failure),
         )
 
     def _fell_behind(self, factor: float) -> bool:
         return factor < LOWEST_REALTIME_FACTOR and self._wall_s > 1.0
+
+
+def _error(failure: BaseException | None) -> str:
+    if failure is None or isinstance(failure, KeyboardInterrupt):
+        return ""
+    return str(failure) if isinstance(failure, TrundleError) else f"{type(failure).__name__}: {failure}"
 
 
 def recording(recorder: Recorder, board: FaultBoard) -> Callable[[Cycle], None]:
@@ -183,7 +196,9 @@ def _figures(path: Path | None, recorded: RecorderReport, duration_s: float) -> 
 
 def exit_code(result: RunResult) -> int:
     """Return what the command line exits with."""
+    report = result.report
     if isinstance(result.failure, TrundleError):
         return result.failure.exit_code
-    codes = {Outcome.REACHED.value: 0, Outcome.INTERRUPTED.value: 130}
-    return codes.get(result.report.outcome, 1)
+    if report.outcome == Outcome.STOPPED.value and any(count.fault == Fault.DEVICE_FAULT.value for count in report.faults):
+        return DeviceError.exit_code
+    return {Outcome.REACHED.value: 0, Outcome.INTERRUPTED.value: 130}.get(report.outcome, 1)

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from runtime.interrupt import Interrupts, Phase, interruptible
 from runtime.log import read
 
-COMMAND = "import sys; from runtime.cli import run_command; sys.exit(run_command(sys.argv[1:]))"
+COMMAND = "from runtime.cli import main; main()"
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -30,3 +31,24 @@ def test_an_interrupted_run_ends_in_order(number: signal.Signals, tmp_path: Path
     assert told["outcome"] == "interrupted"
     assert told["recording"]["ticks"] == told["ticks"]
     assert len(read.ticks(log)) == told["ticks"]
+
+
+def test_what_a_signal_does_depends_on_how_far_the_run_has_come() -> None:
+    interrupts = Interrupts()
+    with pytest.raises(KeyboardInterrupt):
+        interrupts.on_signal(signal.SIGINT, None)
+    interrupts = Interrupts()
+    interrupts.phase = Phase.DRIVING
+    interrupts.on_signal(signal.SIGINT, None)
+    assert interrupts.asked
+    with pytest.raises(KeyboardInterrupt):
+        interrupts.on_signal(signal.SIGTERM, None)
+    interrupts.phase = Phase.CLOSING
+    interrupts.on_signal(signal.SIGINT, None)
+
+
+def test_the_handlers_of_before_are_put_back() -> None:
+    before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+    with interruptible():
+        assert signal.getsignal(signal.SIGINT) != before[0]
+    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == before
