@@ -134,6 +134,7 @@ def review(
 
 def main() -> None:
     """Run the command line and exit with its code."""
+    os.environ.setdefault("RUST_LOG", "error")  # Rerun warns of what is meant: logs without a footer (see runtime/log/sink.py)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # being asked to end is Ctrl-C, whoever asks
     sys.exit(run_command(sys.argv[1:]))
 

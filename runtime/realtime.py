@@ -26,13 +26,11 @@ def realtime(settings: RealtimeSection) -> Iterator[tuple[str, ...]]:
     if settings.freeze_garbage:
         gc.collect()
         gc.freeze()
-        gc.disable()
     try:
         yield tuple(refused)
     finally:
         sys.setswitchinterval(interval_s)
         if settings.freeze_garbage:
-            gc.enable()
             gc.unfreeze()
         if settings.cpus:
             os.sched_setaffinity(0, affinity)

@@ -27,7 +27,7 @@ def require_log(path: Path) -> None:
         if not file.read(4).startswith(b"RRF"):
             raise ConfigurationError(f"{path} is not a Rerun recording")
     try:
-        applications = {entry.application_id for entry in _reader(path).recordings()}
+        applications = {entry.application_id for entry in reader_of(path).recordings()}
     except (RuntimeError, ValueError, OSError) as error:
         raise _damaged(path, error) from error
     if APPLICATION not in applications:
@@ -42,13 +42,14 @@ def chunks(path: Path, content: str) -> Iterator[Chunk]:
     """
     require_log(path)
     try:
-        yield from _reader(path).stream().filter(content=content)
+        yield from reader_of(path).stream().filter(content=content)
     except (RuntimeError, ValueError, OSError) as error:
         raise _damaged(path, error) from error
 
 
-def _reader(path: Path) -> RrdReader:
-    with warnings.catch_warnings(action="ignore", category=RerunWarning):  # a killed process leaves no footer: readable
+def reader_of(path: Path) -> RrdReader:
+    """Return Rerun's reader of a log; it warns that there is no footer, which ours never have."""
+    with warnings.catch_warnings(action="ignore", category=RerunWarning):
         return RrdReader(path)
 
 

@@ -2,6 +2,9 @@
 
 Rerun's own file sink is not used for the file: when a disk fills up its thread dies, flushing and disconnecting can then
 block for ever, and the process cannot even exit (seen with 0.41).  A pipe never fails; the file is ours, and so are its errors.
+
+The file has no footer: Rerun collects it in memory for as long as the run lasts (0.5 MB a second of ours), every reader does
+without, and a log whose writer was killed looks no different.
 """
 
 from __future__ import annotations
@@ -102,7 +105,7 @@ class Sink:
             sinks.append(rr.GrpcServerSink(bind_ip="127.0.0.1", port=live_port, server_memory_limit=_LIVE_MEMORY))
         self._file = LogFile(path) if path is not None else None
         if self._file is not None:
-            sinks.append(rr.FileSink(self._file.inlet))
+            sinks.append(rr.FileSink(self._file.inlet, write_footer=False))
         self._stream.set_sinks(*sinks, default_blueprint=blueprint)
         if self._file is not None:
             self._file.release_inlet()
@@ -134,7 +137,7 @@ class Sink:
         return True
 
     def close(self, timeout_s: float) -> None:
-        """Finish the file with its footer; one that cannot be finished in time is given up, with a fault."""
+        """Finish the file; one that cannot be finished in time is given up, with a fault."""
         if self._file is not None and not self.flush(timeout_s):
             self._file.abandon()
         self._stream.disconnect()
