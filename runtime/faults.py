@@ -35,6 +35,7 @@ class Fault(enum.Enum):
     PLANNER_OVER_BUDGET = "planner_over_budget"
     SHIELD_RAISED = "shield_raised"
     NON_FINITE_COMMAND = "non_finite_command"
+    IMPOSSIBLE_MOTION = "impossible_motion"  # along an axis that the base does not have; clipped, it would go elsewhere
     COMMAND_OUT_OF_LIMITS = "command_out_of_limits"
     DEADLINE_TOLERATED = "deadline_tolerated"
     DEADLINE_HELD = "deadline_held"
@@ -46,6 +47,7 @@ class Fault(enum.Enum):
     NOT_ENABLED = "not_enabled"
     PAUSED = "paused"
     LOG_UNWRITABLE = "log_unwritable"
+    REQUIRED_LOG_UNWRITABLE = "required_log_unwritable"  # the same, where `log.on_unwritable` says stop
     EXTERNAL_STOP = "external_stop"
 
 
@@ -66,6 +68,7 @@ RESPONSE = MappingProxyType(
         Fault.PLANNER_OVER_BUDGET: Response.STAND_DOWN,
         Fault.SHIELD_RAISED: Response.STAND_DOWN,
         Fault.NON_FINITE_COMMAND: Response.STAND_DOWN,
+        Fault.IMPOSSIBLE_MOTION: Response.STAND_DOWN,
         Fault.COMMAND_OUT_OF_LIMITS: Response.STAND_DOWN,
         Fault.DEADLINE_TOLERATED: Response.RUN,
         Fault.DEADLINE_HELD: Response.HOLD,
@@ -76,7 +79,8 @@ RESPONSE = MappingProxyType(
         Fault.EMERGENCY_STOP: Response.LATCH,
         Fault.NOT_ENABLED: Response.STAND_DOWN,
         Fault.PAUSED: Response.STAND_DOWN,
-        Fault.LOG_UNWRITABLE: Response.RUN,  # `log.on_unwritable: stand_down` reports it as EXTERNAL_STOP
+        Fault.LOG_UNWRITABLE: Response.RUN,
+        Fault.REQUIRED_LOG_UNWRITABLE: Response.LATCH,  # a log that has failed stays so: the run gives up
         Fault.EXTERNAL_STOP: Response.LATCH,
     }
 )

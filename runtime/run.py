@@ -109,6 +109,8 @@ class _Run:
 
     def _drive(self, pacer: Pacer, referee: Referee) -> None:
         assembly = self._assembly
+        required = assembly.configuration.log.on_unwritable == "stop"
+        unwritable = Fault.REQUIRED_LOG_UNWRITABLE if required else Fault.LOG_UNWRITABLE
         pacer.measured_plan_ns = self._stopwatch.plan_ns
         stages = Stages(
             sense=assembly.robot.read,
@@ -117,7 +119,7 @@ class _Run:
             plan=assembly.runner.plan,
             admit=assembly.supervisor.admit,
             write=assembly.robot.write,
-            record=recording(self._recorder, assembly.board),
+            record=recording(self._recorder, assembly.board, unwritable),
         )
         with realtime(assembly.configuration.loop.system) as self._refused:
             self._options.ready(assembly)
@@ -167,14 +169,14 @@ def _error(failure: BaseException | None) -> str:
     return str(failure) if isinstance(failure, TrundleError) else f"{type(failure).__name__}: {failure}"
 
 
-def recording(recorder: Recorder, board: FaultBoard) -> Callable[[Cycle], None]:
+def recording(recorder: Recorder, board: FaultBoard, unwritable: Fault) -> Callable[[Cycle], None]:
     """Return `recorder.record` that leaves word on the fault board when the log has become unwritable."""
 
     def record(cycle: Cycle) -> None:
         recorder.record(cycle)
         sentence = recorder.fault()
         if sentence:
-            board.post(FaultReport(Fault.LOG_UNWRITABLE, "recorder", sentence))
+            board.post(FaultReport(unwritable, "recorder", sentence))
 
     return record
 

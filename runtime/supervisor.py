@@ -6,16 +6,18 @@ from dataclasses import dataclass, replace
 
 from drivers.interface.commands import BaseLimits, BodyTwist, Command, JointLimits, JointTrajectory
 from drivers.interface.sensed import Sensed
-from estimators.belief import Belief, EstimatorFault
+from estimators.belief import Belief
 from planners.planner import Plan
 from planners.shield import Filtered, ReachableSet, Shield
 from runtime.cycle import Verdict
+from runtime.diagnosis import Diagnosis, worst
 from runtime.fault_board import FaultBoard
 from runtime.faults import Fault, FaultReport, Response
+from runtime.guards import checked, report
 from runtime.limits import Limiter, Motion
 from runtime.operator_state import OperatorState
-from runtime.sections import DeadlineLadder, SupervisorSection
-from runtime.watch import SECOND_NS, DeviceWatch
+from runtime.sections import SupervisorSection
+from runtime.watch import SECOND_NS
 
 STANDING = ReachableSet(BodyTwist(), BodyTwist())
 
@@ -39,20 +41,17 @@ class Supervisor:
         self._settings = settings
         self._setup = setup
         self._shield = shield
-        self._board = board
-        self._watch = DeviceWatch(settings)
+        self._diagnosis = Diagnosis(settings, setup.limits, setup.plan_budget_ns, board)
         self._limiter = None if setup.limits is None else Limiter(setup.limits, setup.period_s)
         self._arm_at_rest = None if setup.arm_limits is None else JointTrajectory.rest()
         self._operator = OperatorState(enabled=not setup.has_operator)
-        self._latched: FaultReport | None = None
-        self._misses = 0
         self._motion = Motion()
         self._last = Command(None, None, 0, 0)
 
     def admit(self, plan: Plan, belief: Belief, sensed: Sensed) -> Verdict:
         """Return what is sent at this tick, and why."""
         self._operator = self._operator.after(sensed.operator, sensed.tick.start_ns)
-        faults = self._faults(plan, belief, sensed)
+        faults = self._diagnosis.faults(plan, belief, sensed, self._operator)
         self._resume_from(belief, sensed)
         reachable = self._reachable(worst(faults))
         asked = self._asked(plan, belief, sensed, reachable)
@@ -61,38 +60,10 @@ class Supervisor:
         self._remember(command)
         return Verdict(command, asked, worst(faults), tuple(faults), reachable, filtered)
 
-    def _faults(self, plan: Plan, belief: Belief, sensed: Sensed) -> list[FaultReport]:
-        faults = self._watch.faults(sensed) + self._operator.faults() + self._board.take()
-        for fault in belief.faults:
-            diverged = fault is EstimatorFault.DIVERGED
-            faults.append(FaultReport(Fault.ESTIMATOR_DIVERGED if diverged else Fault.INVALID_VALUES, "estimator"))
-        if plan.base is not None and not plan.base.finite:
-            faults.append(FaultReport(Fault.NON_FINITE_COMMAND, "planner", f"it asked for {plan.base}"))
-        if sensed.tick.last_plan_ns > self._setup.plan_budget_ns:
-            took = f"it took {sensed.tick.last_plan_ns / 1e6:.1f} ms of {self._setup.plan_budget_ns / 1e6:.1f} ms"
-            faults.append(FaultReport(Fault.PLANNER_OVER_BUDGET, "planner", took))
-        faults += self._deadlines(sensed.tick.skipped)
-        return self._with_latched(faults)
-
-    def _deadlines(self, skipped: int) -> list[FaultReport]:
-        self._misses = self._misses + skipped if skipped else 0
-        rung = ladder_rung(self._settings.deadline_ladder, self._misses)
-        return [] if rung is None else [FaultReport(rung, "loop", f"{self._misses} deadlines missed in a row")]
-
-    def _with_latched(self, faults: list[FaultReport]) -> list[FaultReport]:
-        if self._operator.reset:
-            self._latched = None
-        latching = next((report for report in faults if report.response is Response.LATCH), None)
-        if latching is not None and self._latched is None:
-            self._latched = latching
-        if self._latched is not None and latching is None:
-            return [*faults, replace(self._latched, detail="latched until the operator resets")]
-        return faults
-
     def _resume_from(self, belief: Belief, sensed: Sensed) -> None:
         """After the last command has expired the base stands or brakes by itself: go on from what it really does."""
         if self._limiter is not None and sensed.tick.start_ns >= self._last.expires_ns > 0:
-            self._motion = Motion(belief.twist)
+            self._motion = Motion(belief.twist if belief.twist.finite else BodyTwist())
 
     def _reachable(self, response: Response) -> ReachableSet:
         if self._limiter is None:
@@ -117,9 +88,9 @@ class Supervisor:
         if worst(faults) not in {Response.RUN, Response.DECELERATE} or asked.base is None:
             return None
         try:
-            return self._shield.filter(asked, belief, reachable)
+            return checked(self._shield.filter(asked, belief, reachable), Filtered)
         except Exception as error:  # noqa: BLE001 - a shield is anyone's code; its failure must stop the robot, not the loop
-            faults.append(FaultReport(Fault.SHIELD_RAISED, "shield", f"{type(error).__name__}: {error}"))
+            faults.append(report(error, Fault.SHIELD_RAISED, "shield"))
             return None
 
     def _responding(self, response: Response, asked: Command, filtered: Filtered | None, sensed: Sensed) -> Command:
@@ -138,10 +109,10 @@ class Supervisor:
         return self._stopping(command)
 
     def _wrong_with_base(self, command: Command, sensed: Sensed) -> FaultReport | None:
-        twist = command.base
-        if twist is None or self._limiter is None:
+        if self._limiter is None:
             return None
-        if twist.finite and self._limiter.within_caps(twist) and command.expires_ns > sensed.tick.start_ns:
+        twist = command.base
+        if twist is not None and twist.finite and self._limiter.within_caps(twist) and command.expires_ns > sensed.tick.start_ns:
             return None
         return FaultReport(Fault.COMMAND_OUT_OF_LIMITS, "supervisor", f"{twist} failed the last check")
 
@@ -160,21 +131,3 @@ class Supervisor:
         if self._limiter is not None and command.base is not None:
             self._motion = self._limiter.after(self._motion, command.base)
         self._last = command
-
-
-def worst(faults: list[FaultReport]) -> Response:
-    """Return the most severe response that the faults ask for."""
-    return max((report.response for report in faults), default=Response.RUN)
-
-
-def ladder_rung(ladder: DeadlineLadder, misses: int) -> Fault | None:
-    """Return the rung that so many consecutive misses reach."""
-    if misses == 0:
-        return None
-    rungs = (
-        (ladder.latch, Fault.DEADLINE_LATCHED),
-        (ladder.stop, Fault.DEADLINE_STOPPED),
-        (ladder.decelerate, Fault.DEADLINE_SLOWED),
-        (ladder.hold, Fault.DEADLINE_HELD),
-    )
-    return next((fault for threshold, fault in rungs if misses >= threshold), Fault.DEADLINE_TOLERATED)

@@ -1,5 +1,7 @@
 """Settings of the field log."""
 
+from typing import Literal
+
 from pydantic import Field
 
 from drivers.interface.settings import Settings
@@ -14,4 +16,5 @@ class LogSettings(Settings):
     draw_interval_s: float = Field(1.0, gt=0.0, le=60.0, description="the same of what is only drawn; live: flush_interval_s")
     depth: bool = Field(True, description="record depth images; without them a log cannot be replayed")
     view_rate_hz: float = Field(5.0, gt=0.0, le=200.0, description="most that grid, clearance and paths are drawn per second")
+    on_unwritable: Literal["continue", "stop"] = Field("continue", description="what a log that can no longer be written means")
     live_port: int = Field(9876, ge=1024, le=65_535, description="loopback port of the live view")

@@ -135,6 +135,84 @@ def test_a_collision_ends_the_run() -> None:
     assert run.exit_code(run.RunResult(report)) == 1
 
 
+class Unplugged:
+    """Breaks one method of one device from a tick on."""
+
+    def __init__(self, device: str, method: str) -> None:
+        self.device, self.method = device, method
+        self.tick = 0
+
+    def ready(self, assembly: Assembly) -> None:
+        device = getattr(assembly.robot.devices, self.device)
+        working = getattr(device, self.method)
+
+        def broken(*arguments: object) -> object:
+            if self.tick >= 40:
+                raise OSError("no such device")
+            return working(*arguments)
+
+        setattr(device, self.method, broken)
+
+    def update(self, cycle: Cycle) -> None:
+        self.tick = cycle.sensed.tick.index
+        self.last = cycle
+
+
+@pytest.mark.parametrize(("device", "method"), [("camera", "latest"), ("base", "drain"), ("base", "command")])
+def test_a_device_that_dies_stops_the_robot_and_ends_the_run_in_order(device: str, method: str, tmp_path: Path) -> None:
+    dying = Unplugged(device, method)
+    configured = configuration.load("static_corridor")
+    options = run.RunOptions(ready=dying.ready, progress=dying.update, log=tmp_path / "a.rrd")
+    result = run.run(configured, options)
+    assert result.report.outcome == "stopped"
+    assert run.exit_code(result) == 3
+    (fault,) = [count for count in result.report.faults if count.fault == "device_fault"]
+    assert (fault.device, fault.detail) == (device, "OSError: no such device")
+    assert 40 <= fault.first_tick <= 42
+    assert dying.last.sensed.truth.twist.speed_m_s < 0.02
+    assert len(read.ticks(tmp_path / "a.rrd")) == result.report.ticks
+    assert "device_fault" in read.texts(tmp_path / "a.rrd")
+
+
+def test_a_robot_that_cannot_be_stopped_is_told_and_the_report_is_made(tmp_path: Path) -> None:
+    def ready(assembly: Assembly) -> None:
+        def stop() -> None:
+            raise OSError("no such device")
+
+        assembly.robot.devices.camera.stop = stop
+
+    options = run.RunOptions(ready=ready, log=tmp_path / "a.rrd")
+    result = run.run(configuration.load("static_corridor", ("mission.time_limit_s=1",)), options)
+    assert str(result.failure) == "the camera cannot stop: OSError: no such device"
+    assert run.exit_code(result) == 3
+    assert result.report.outcome == "timed_out"
+    assert len(read.ticks(tmp_path / "a.rrd")) == result.report.ticks
+
+
+@pytest.mark.parametrize(
+    ("wish", "outcome", "fault"),
+    [("continue", "timed_out", "log_unwritable"), ("stop", "stopped", "required_log_unwritable")],
+)
+def test_a_log_that_cannot_be_written_is_what_the_configuration_makes_of_it(wish: str, outcome: str, fault: str) -> None:
+    changes = (f"log.on_unwritable={wish}", "mission.time_limit_s=4", "supervisor.give_up_after_s=1")
+    report = drive("static_corridor", *changes, log=Path("/dev/full"))
+    assert report.outcome == outcome
+    (count,) = report.faults
+    assert (count.fault, count.device) == (fault, "recorder")
+    assert "No space left on device" in report.recording.fault
+
+
+def test_an_estimator_that_fails_at_the_first_tick_ends_the_run_in_order(tmp_path: Path) -> None:
+    def ready(assembly: Assembly) -> None:
+        assembly.estimator.update = lambda sensed: 1 / 0
+
+    options = run.RunOptions(ready=ready, log=tmp_path / "a.rrd")
+    result = run.run(configuration.load("static_corridor"), options)
+    assert str(result.failure) == "the estimator failed at the first tick: ZeroDivisionError: division by zero"
+    assert run.exit_code(result) == 1
+    assert (result.report.outcome, result.report.ticks, result.report.error) == ("stopped", 0, str(result.failure))
+
+
 def test_the_operators_script_pauses_and_sends_elsewhere() -> None:
     events = (
         "[{at_s: 0.0, action: enable}, {at_s: 1.0, action: pause}, {at_s: 2.0, action: resume},"

@@ -5,18 +5,20 @@ from dataclasses import replace
 
 import pytest
 
-from drivers.interface.commands import BodyTwist, Command
+from drivers.interface.commands import BaseLimits, BodyTwist, Command
 from drivers.interface.devices import DeviceState
-from drivers.interface.samples import EmergencyStop, Jog, ResetFaults, SetEnabled, SetPaused
+from drivers.interface.geometry import SE2
+from drivers.interface.samples import EmergencyStop, Jog, ResetFaults, SetEnabled, SetPaused, Stamp, TruthSample
 from drivers.interface.sensed import Sensed, Tick
 from estimators.belief import EstimatorFault
 from planners.planner import Plan
 from planners.shield import Filtered
 from runtime.cycle import Verdict
+from runtime.diagnosis import ladder_rung
 from runtime.fault_board import FaultBoard
 from runtime.faults import RESPONSE, Fault, FaultReport, Response
 from runtime.sections import DeadlineLadder, SupervisorSection
-from runtime.supervisor import Supervisor, SupervisorSetup, ladder_rung
+from runtime.supervisor import Supervisor, SupervisorSetup
 from tests.runtime.cycles import LIMITS, MS, PERIOD_NS, belief, health, sensed, wheels
 
 FORWARD = Plan(base=BodyTwist(0.6, 0.0, 0.0))
@@ -34,8 +36,10 @@ class Passing:
         return Filtered(command if self.twist is None else replace(command, base=self.twist))
 
 
-def supervisor(shield: Passing | None = None, board: FaultBoard | None = None, **settings: object) -> Supervisor:
-    setup = SupervisorSetup(PERIOD_NS * 1e-9, LIMITS, plan_budget_ns=PERIOD_NS, has_operator=True)
+def supervisor(
+    shield: Passing | None = None, board: FaultBoard | None = None, limits: BaseLimits = LIMITS, **settings: object
+) -> Supervisor:
+    setup = SupervisorSetup(PERIOD_NS * 1e-9, limits, plan_budget_ns=PERIOD_NS, has_operator=True)
     return Supervisor(SupervisorSection(**settings), setup, shield or Passing(), board or FaultBoard())
 
 
@@ -232,3 +236,51 @@ def test_a_command_that_expired_at_the_base_is_reported_once() -> None:
     drive(guard, range(3))
     tripped = drive(guard, range(3, 6), health=(health(expired_commands=1),))
     assert [Fault.DEAD_MAN_TRIPPED in present(v) for v in tripped] == [True, False, False]
+
+
+class Forgetful:
+    """A shield that does not answer, or takes the base out of the command."""
+
+    def __init__(self, answers: bool) -> None:
+        self.answers = answers
+
+    def filter(self, command: Command, belief: object, reachable: object) -> Filtered | None:
+        return Filtered(replace(command, base=None)) if self.answers else None
+
+
+@pytest.mark.parametrize(("answers", "fault"), [(False, Fault.SHIELD_RAISED), (True, Fault.COMMAND_OUT_OF_LIMITS)])
+def test_a_shield_that_says_nothing_stops_the_robot(answers: bool, fault: Fault) -> None:
+    verdict = drive(supervisor(Forgetful(answers)), range(3))[-1]
+    assert present(verdict) == {fault}
+    assert verdict.command.base == BodyTwist()
+
+
+def test_motion_that_the_base_cannot_make_is_named_and_stops_it_instead_of_being_clipped() -> None:
+    skid_steer = replace(LIMITS, velocity=BodyTwist(0.75, 0.0, 1.2))
+    guard = supervisor(limits=skid_steer)
+    moving = drive(guard, range(40))[-1]
+    assert moving.command.base.vx > 0.5
+    sideways = drive(guard, range(40, 60), Plan(base=BodyTwist(0.6, 0.1, 0.0)))
+    assert present(sideways[0]) == {Fault.IMPOSSIBLE_MOTION}
+    assert sideways[-1].command.base == BodyTwist()
+    assert drive(guard, range(60, 61), Plan(base=BodyTwist(0.6, 1e-12, 0.0)))[-1].response is Response.RUN
+
+
+def test_a_belief_that_is_not_finite_never_reaches_the_wire() -> None:
+    guard = supervisor()
+    drive(guard, range(10))
+    lost = belief(30, twist=BodyTwist(math.nan, 0.0, 0.0), faults=(EstimatorFault.DIVERGED,))  # the last command has expired
+    verdict = guard.admit(FORWARD, lost, sensed(30))
+    assert verdict.response is Response.LATCH
+    assert verdict.command.base == BodyTwist()
+
+
+def test_a_contact_latches() -> None:
+    guard = supervisor()
+    drive(guard, range(10))
+    truth = TruthSample(Stamp(0, 0, 0), SE2(), BodyTwist(), (), -0.01, ("wall",))
+    assert (
+        FaultReport(Fault.COLLISION, "truth", "it touches wall")
+        in guard.admit(FORWARD, belief(10), sensed(10, truth=truth)).faults
+    )
+    assert guard.admit(FORWARD, belief(11), sensed(11)).response is Response.LATCH
