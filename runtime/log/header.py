@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+import re
 import subprocess
 from dataclasses import dataclass
 from importlib import metadata
@@ -12,7 +13,6 @@ from typing import Literal
 from drivers.interface.geometry import SE2
 
 SCHEMA_VERSION = 1  # of the replay columns; raised when a reader of the old ones would misread the new
-_LIBRARIES = ("mujoco", "numba", "numpy", "opencv-python-headless", "osqp", "rerun-sdk", "scipy")
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +59,10 @@ def code_version() -> tuple[str, bool]:
 
 
 def library_versions() -> tuple[str, ...]:
-    """Return "name version" of every library whose numbers enter a run."""
-    return tuple(f"{name} {metadata.version(name)}" for name in _LIBRARIES)
+    """Return "name version" of every library that a run needs, as this distribution's own metadata lists them."""
+    needed = (text for text in metadata.requires("trundle") or () if "extra ==" not in text)
+    names = sorted(re.split(r"[^\w.-]", text, maxsplit=1)[0] for text in needed)
+    return tuple(f"{name} {metadata.version(name)}" for name in names)
 
 
 def machine() -> str:
