@@ -46,11 +46,18 @@ class Assembly:
     board: FaultBoard
 
     def warm_up(self) -> None:
-        """Compile every kernel, so that none is compiled inside a tick."""
+        """Compile every kernel, so that none is compiled inside a tick; a paced world has not moved on meanwhile."""
         self.estimator.warm_up()
         self.router.warm_up()
         self.planner.warm_up()
         self.shield.warm_up()
+        if isinstance(self.clock, PacedClock):
+            self.clock.begin()
+
+    @property
+    def world_late_s(self) -> float:
+        """For how long a paced world has kept the loop waiting; nothing else does."""
+        return self.clock.world_late_ns * 1e-9 if isinstance(self.clock, PacedClock) else 0.0
 
     def pacer(self) -> Pacer:
         """Return a beat that starts now."""

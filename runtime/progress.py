@@ -26,6 +26,7 @@ class RunProgress:
         self._title = title
         self._task = self._bar.add_task(f"{title}: preparing (kernels compile at the first run)", total=None, note="")
         self._limit_s = 0.0
+        self._start_ns: int | None = None
         self._goal_m = math.nan
         self._next_s = 0.0
 
@@ -55,9 +56,10 @@ class RunProgress:
         self._bar.refresh()
 
     def _fraction(self, cycle: Cycle) -> float:
-        goal = cycle.sensed.mission.goal
+        goal, now_ns = cycle.sensed.mission.goal, cycle.sensed.tick.start_ns
+        self._start_ns = now_ns if self._start_ns is None else self._start_ns  # the host's clock does not begin at 0
         if goal is None:
-            return min(1.0, cycle.sensed.tick.start_ns / SECOND_NS / self._limit_s)
+            return min(1.0, (now_ns - self._start_ns) / SECOND_NS / self._limit_s)
         pose = cycle.belief.map_from_base
         left_m = math.hypot(goal.x_m - pose.x, goal.y_m - pose.y)
         if math.isnan(self._goal_m):

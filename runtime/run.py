@@ -25,7 +25,7 @@ from runtime.referee import Outcome, Referee
 from runtime.report import FaultCount, RecordingFigures, RunReport, finite_or_none, stage_times
 from runtime.stopwatch import Stopwatch
 
-LOWEST_REALTIME_FACTOR = 0.98
+LARGEST_LAG = 0.02  # of the wall time: a real-time factor of 0.98
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +134,7 @@ class _Run:
         outcome = referee.outcome or Outcome.STOPPED
         if isinstance(failure, KeyboardInterrupt):
             outcome = Outcome.INTERRUPTED
-        factor = tally.duration_s / self._wall_s if self._wall_s else 0.0
+        factor = (tally.duration_s - assembly.world_late_s) / self._wall_s if self._wall_s else 0.0
         return RunReport(
             outcome=outcome.value,
             planner=assembly.configuration.planner.choice.name,
@@ -153,14 +153,11 @@ class _Run:
                 for (fault, device), count in tally.faults.items()
             ),
             realtime_factor=factor,
-            realtime_void=not assembly.lockstep and assembly.world is not None and self._fell_behind(factor),
+            realtime_void=assembly.world_late_s > LARGEST_LAG * self._wall_s,
             realtime_refused=self._refused,
             recording=_figures(self._options.log, recorded, tally.duration_s),
             error=_error(failure),
         )
-
-    def _fell_behind(self, factor: float) -> bool:
-        return factor < LOWEST_REALTIME_FACTOR and self._wall_s > 1.0
 
 
 def _error(failure: BaseException | None) -> str:

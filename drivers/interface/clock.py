@@ -99,9 +99,12 @@ class PacedClock:
         self._real = RealClock()
         self._world = world
         self._step_ns = step_ns
-        self._start_ns = 0 if world is None else world.now_ns
-        self._anchor_ns = self._real.now_ns() - self._start_ns
-        self.world_time_ns = 0  # how much of the host's time the world managed to follow
+        self.world_late_ns = 0  # for how long in all deadlines had passed before the world had been stepped to them
+        self.begin()
+
+    def begin(self) -> None:
+        """Go on from the world's time now: what the host spent since the last step (on compiling, say) has not passed in it."""
+        self._anchor_ns = self._real.now_ns() - (0 if self._world is None else self._world.now_ns)
 
     def now_ns(self) -> int:
         """Return the host's time since the anchor, on the world's scale [ns]."""
@@ -112,7 +115,9 @@ class PacedClock:
         if self._world is None:
             self._real.sleep_until(deadline_ns + self._anchor_ns)
             return
+        began_ns = self.now_ns()
         self._world.step_to(deadline_ns - self._step_ns)  # most of the work before the deadline, not after it
+        self.world_late_ns += max(0, self.now_ns() - max(deadline_ns, began_ns))
         self._real.sleep_until(deadline_ns + self._anchor_ns)
         late_ns = max(0, self.now_ns() - deadline_ns)
         self._world.step_to(deadline_ns + late_ns // self._step_ns * self._step_ns)

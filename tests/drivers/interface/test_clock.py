@@ -140,6 +140,28 @@ def test_a_paced_world_goes_on_without_a_late_loop():
     assert world.now_ns >= 12 * MS
 
 
+def test_what_the_host_does_before_it_begins_does_not_pass_in_the_world():
+    world, real = World(50 * MS), RealClock()
+    clock = PacedClock(world, step_ns=1 * MS)
+    real.sleep_until(real.now_ns() + 10 * MS)
+    before = clock.now_ns()
+    clock.begin()
+    assert before >= 60 * MS
+    assert 50 * MS <= clock.now_ns() < before + 10 * MS
+
+
+def test_a_world_that_cannot_follow_is_counted():
+    class Slow(World):
+        def step_to(self, time_ns: int) -> None:
+            super().step_to(time_ns)
+            real.sleep_until(real.now_ns() + 6 * MS)
+
+    real = RealClock()
+    clock = PacedClock(Slow(), step_ns=1 * MS)
+    clock.sleep_until(2 * MS)
+    assert clock.world_late_ns >= 4 * MS - 1 * MS
+
+
 def test_recordings_without_a_world_are_paced_too():
     clock = PacedClock(None, step_ns=1 * MS)
     clock.sleep_until(5 * MS)
