@@ -40,8 +40,8 @@ class ArmSettings(Settings):
     torque_noise_nm: float = Field(default=0.05, ge=0.0, le=10.0, description="standard deviation of the torque sensors")
     latency_s: float = Field(default=0.001, ge=0.0, le=1.0, description="from measuring to our side")
     command_latency_s: float = Field(default=0.001, ge=0.0, le=1.0, description="from command() to the first set point")
-    dropout_probability: float = Field(default=0.0005, ge=0.0, le=1.0, description="chance that a sample is lost on the way")
-    capacity: int = Field(default=256, ge=1, le=100_000, description="samples that wait at most to be drained")
+    loss_probability: float = Field(default=0.0005, ge=0.0, le=1.0, description="chance that a sample is lost on the way")
+    buffered_samples: int = Field(default=256, ge=1, le=100_000, description="samples that wait at most to be drained")
 
 
 class SimArm:
@@ -154,7 +154,7 @@ class SimArm:
         load = data.qfrc_actuator[self._dof] + data.qfrc_gravcomp[self._dof]
         torque = load + self._rng.normal(0.0, s.torque_noise_nm, JOINTS)
         self._sequence += 1
-        if self._rng.random() < s.dropout_probability:
+        if self._rng.random() < s.loss_probability:
             self._dropped += 1
             return
         stamp = Stamp(now_ns, now_ns + self._delivery.latency_ns, self._sequence)
@@ -165,6 +165,8 @@ class SimArm:
 
     def _reset(self) -> None:
         self._rng = stream(self._setup.seed, f"{self._setup.name}.joints")
-        self._delivery: Delivery[JointSample] = Delivery(round(self._settings.latency_s * SECOND_NS), self._settings.capacity)
+        self._delivery: Delivery[JointSample] = Delivery(
+            round(self._settings.latency_s * SECOND_NS), self._settings.buffered_samples
+        )
         self._sequence = self._dropped = self._follower.expired = 0
         self._next_ns = self._after(self._world.now_ns)

@@ -60,7 +60,7 @@ class DepthCameraSettings(Settings):
     range_max_m: float = Field(default=6.0, gt=0.0, le=20.0, description="nothing farther is reported; D455: 0.6 to 6 m is ideal")
     depth_unit_m: float = Field(default=0.001, ge=1e-4, le=0.01, description="of one count of the 16-bit depth")
     latency_s: float = Field(default=0.04, ge=0.0, le=1.0, description="from capture to the host")
-    frame_loss_probability: float = Field(default=0.002, ge=0.0, le=1.0, description="of a whole frame")
+    loss_probability: float = Field(default=0.002, ge=0.0, le=1.0, description="of a whole frame")
     sees_robot: bool = Field(default=False, description="whether the robot's own body is in the picture")
     x_m: float = Field(default=0.1, ge=-2.0, le=2.0, description="mount in base")
     y_m: float = Field(default=0.0, ge=-2.0, le=2.0, description="mount in base")
@@ -91,7 +91,7 @@ class SimDepthCamera(SimSensor[DepthFrame]):
         Raises:
             ConfigurationError: there is no simulated world.
         """
-        super().__init__(setup, settings.rate_hz, settings.latency_s, settings.frame_loss_probability)
+        super().__init__(setup, settings.rate_hz, settings.latency_s, settings.loss_probability)
         self._settings = settings
         self._intrinsics = intrinsics(settings.width, settings.height, settings.horizontal_fov_deg)
         mount = (settings.x_m, settings.y_m, settings.z_m, settings.roll_rad, settings.pitch_rad, settings.yaw_rad)

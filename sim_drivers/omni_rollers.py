@@ -34,8 +34,8 @@ class RollerOmniChassis:
     wheel closes: where one roller hands over to the next, the support height is the wheel's radius again.
     """
 
-    max_step_s = 0.001
-    period_ns = 5_000_000
+    max_step_s = 0.0025
+    period_ns = 2_500_000
 
     def __init__(self, true: OmniThreeWheel, mass_kg: float, size_m: tuple[float, float], torque_limit_nm: float) -> None:
         """Take the true geometry, the whole mass, radius and height of the body, and what a motor gives."""

@@ -34,7 +34,8 @@ class RangeScannerSettings(Settings):
     noise_m: float = Field(default=0.015, ge=0.0, le=1.0, description="deviation of one range")
     dropout_probability: float = Field(default=0.001, ge=0.0, le=1.0, description="of one beam to be invalid (NaN)")
     latency_s: float = Field(default=0.025, ge=0.0, le=1.0, description="from capture to the host; a scan takes a turn")
-    buffered_scans: int = Field(default=40, ge=1, le=10_000, description="how many wait for the loop")
+    loss_probability: float = Field(default=0.0005, ge=0.0, le=1.0, description="of a whole scan")
+    buffered_samples: int = Field(default=40, ge=1, le=10_000, description="how many wait for the loop")
 
     @model_validator(mode="after")
     def _ordered(self) -> RangeScannerSettings:
@@ -57,7 +58,7 @@ class SimRangeScanner(SimSensor[RangeScan]):
         Raises:
             ConfigurationError: there is no simulated world.
         """
-        super().__init__(setup, settings.rate_hz, settings.latency_s, capacity=settings.buffered_scans)
+        super().__init__(setup, settings.rate_hz, settings.latency_s, settings.loss_probability, settings.buffered_samples)
         self._settings = settings
         angles = np.linspace(settings.angle_min_rad, settings.angle_max_rad, settings.beams)
         self._directions = np.stack((np.cos(angles), np.sin(angles), np.zeros(settings.beams)), axis=1)  # (beams, 3) in base

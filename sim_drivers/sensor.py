@@ -98,9 +98,8 @@ class SimSensor(ABC, Generic[S]):
 
     def _reset(self) -> None:
         self._delivery: Delivery[S] = Delivery(self._latency_ns, self._capacity)
+        self._losses = stream(self._setup.seed, f"{self._setup.name}.loss")  # one draw a sample, in their order
         self._sequence = self._dropped = 0
 
     def _is_lost(self) -> bool:
-        if self._loss_probability == 0.0:
-            return False
-        return bool(stream(self._setup.seed, f"{self._setup.name}.loss", self._sequence).random() < self._loss_probability)
+        return self._losses.random() < self._loss_probability

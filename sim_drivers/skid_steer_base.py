@@ -67,8 +67,8 @@ class SkidSteerChassis:
     1.49 times the geometric track, and Clearpath's own controller configuration uses 1.5.  In a fast curve it shrinks.
     """
 
-    max_step_s = 0.002
-    period_ns = 10_000_000
+    max_step_s = 0.0025
+    period_ns = 2_500_000
 
     def __init__(self, settings: SkidSteerSettings) -> None:
         """Take the settings."""

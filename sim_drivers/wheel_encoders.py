@@ -21,8 +21,8 @@ class EncoderSettings(Settings):
     jitter_counts: float = Field(default=0.3, ge=0.0, le=100.0, description="standard deviation of the angle, before counting")
     velocity_lag_s: float = Field(default=0.015, ge=0.0, le=1.0, description="time constant of the filter on the counted rate")
     latency_s: float = Field(default=0.004, ge=0.0, le=1.0, description="from measuring to our side")
-    dropout_probability: float = Field(default=0.001, ge=0.0, le=1.0, description="chance that a sample is lost on the way")
-    capacity: int = Field(default=256, ge=1, le=100_000, description="samples that wait at most to be drained")
+    loss_probability: float = Field(default=0.001, ge=0.0, le=1.0, description="chance that a sample is lost on the way")
+    buffered_samples: int = Field(default=256, ge=1, le=100_000, description="samples that wait at most to be drained")
 
     @property
     def period_ns(self) -> int:
@@ -47,7 +47,7 @@ class WheelEncoders:
         self._sequence = 0
         self._position = np.zeros(wheels)
         self._velocity = np.zeros(wheels)
-        self.delivery: Delivery[WheelSample] = Delivery(round(settings.latency_s * 1e9), settings.capacity)
+        self.delivery: Delivery[WheelSample] = Delivery(round(settings.latency_s * 1e9), settings.buffered_samples)
         self.dropped = 0
 
     def due(self, now_ns: int) -> bool:
@@ -62,7 +62,7 @@ class WheelEncoders:
         self._velocity = self._filtered_rate(now_ns, position)
         self._position = position
         self._sequence += 1
-        if self._rng.random() < self._settings.dropout_probability:
+        if self._rng.random() < self._settings.loss_probability:
             self.dropped += 1
             return
         stamp = Stamp(now_ns, now_ns + self.delivery.latency_ns, self._sequence)

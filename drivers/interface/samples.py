@@ -28,7 +28,11 @@ def frozen_array(array: A) -> A:
 
 @dataclass(frozen=True, slots=True)
 class Stamp:
-    """When a sample was taken [ns]: by the device (on the clock named), and when our side received it (host monotonic)."""
+    """When a sample was taken [ns], and when our side received it (the loop's clock).
+
+    `captured_ns` is on the loop's clock as well: a driver whose device has a clock of its own converts, and names that clock.
+    `sequence` counts every sample that was taken, also those that got lost: a gap is a loss.
+    """
 
     captured_ns: int
     received_ns: int

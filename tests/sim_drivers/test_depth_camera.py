@@ -13,7 +13,7 @@ from sim_drivers.scene import Mover, Scene, Shape, StaticObstacle
 from sim_drivers.world import MujocoWorld, WorldSettings
 
 PERFECT = {
-    "frame_loss_probability": 0.0,
+    "loss_probability": 0.0,
     "noise": {"subpixel_px": 0, "shadow_hole_probability": 0, "edge_hole_probability": 0, "dropout_probability": 0},
 }
 WALL = StaticObstacle("wall", Shape.box(0.2, 20.0, 6.0), SE2(3.1, 0.0, 0.0))
@@ -127,7 +127,7 @@ def test_holes_come_as_often_as_the_settings_say():
 
 
 def test_frames_come_late_and_only_the_newest_counts():
-    world, camera = looking_at(WALL, rate_hz=20.0, latency_s=0.03, frame_loss_probability=0.0)
+    world, camera = looking_at(WALL, rate_hz=20.0, latency_s=0.03, loss_probability=0.0)
     world.step_to(79_000_000)
     assert camera.latest() is None  # captured at 50 ms, on its way until 80 ms
     world.step_to(80_000_000)
@@ -142,7 +142,7 @@ def test_frames_come_late_and_only_the_newest_counts():
 
 
 def test_lost_frames_are_counted_and_leave_a_gap():
-    world, camera = looking_at(WALL, rate_hz=50.0, latency_s=0.0, frame_loss_probability=0.3)
+    world, camera = looking_at(WALL, rate_hz=50.0, latency_s=0.0, loss_probability=0.3)
     seen = []
     for tick in range(1, 51):
         world.step_to(tick * 20_000_000)

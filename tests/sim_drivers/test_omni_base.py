@@ -15,12 +15,12 @@ from sim_drivers.world import MujocoWorld, WorldSettings
 MS = 1_000_000
 START = SE2(1.0, 2.0, 0.7)
 EXACT = {"wheel_radius_error": (0.0, 0.0, 0.0), "wheel_heading_error_rad": (0.0, 0.0, 0.0), "slip_m_per_sqrt_m": 0.0}
-QUIET = {"jitter_counts": 0.0, "dropout_probability": 0.0}
+QUIET = {"jitter_counts": 0.0, "loss_probability": 0.0}
 WHEELS = ("ideal", "rollers")
 
 
-def make(seed=1, static=(), **settings):
-    world = MujocoWorld(Scene("test", START, (), 60.0, static), WorldSettings())
+def make(seed=1, static=(), physics_step_s=None, **settings):
+    world = MujocoWorld(Scene("test", START, (), 60.0, static), WorldSettings(physics_step_s=physics_step_s))
     base = SimOmniBase(OmniBaseSettings(**settings), DeviceSetup("base", seed, lambda: world.now_ns, world))
     world.compile()
     base.open()
@@ -109,6 +109,18 @@ def test_rollers_slip_under_acceleration_but_little():
     assert 1e-5 < abs(slip) < 0.02
 
 
+def test_rollers_go_the_same_way_at_a_fifth_of_the_physics_step():
+    ends = []
+    for step_s in (None, 0.0005):
+        world, base = make(wheels="rollers", physics_step_s=step_s)
+        for quarter in range(16):
+            hold(world, base, BodyTwist(0.4 * math.cos(quarter), 0.4 * math.sin(quarter), 0.5), 0.25)
+        ends.append(pose(world))
+    off = ends[0].inverse() @ ends[1]
+    assert math.hypot(off.x, off.y) < 2e-3
+    assert abs(off.yaw) < 3e-3
+
+
 def test_rollers_stay_upright_and_do_not_bounce():
     world, base = make(wheels="rollers")
     heights, tilts = [], []
@@ -190,7 +202,7 @@ def test_life_cycle():
 
 
 def test_samples_come_on_the_grid_and_late():
-    world, base = make(encoders={"latency_s": 0.025, "dropout_probability": 0.0})
+    world, base = make(encoders={"latency_s": 0.025, "loss_probability": 0.0})
     world.step_to(1000 * MS)
     samples = base.drain()
     captured = [s.stamp.captured_ns for s in samples]
@@ -202,7 +214,7 @@ def test_samples_come_on_the_grid_and_late():
 
 
 def test_lost_and_overflowed_samples_are_counted():
-    world, base = make(encoders={"dropout_probability": 0.3, "capacity": 10})
+    world, base = make(encoders={"loss_probability": 0.3, "buffered_samples": 10})
     world.step_to(2000 * MS)
     health = base.health()
     assert 40 < health.dropped < 80

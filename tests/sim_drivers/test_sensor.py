@@ -108,6 +108,19 @@ def test_samples_are_visible_from_their_time_of_reception_on_and_in_order(sensor
     assert health.expected_period_ns == device.period_ns
 
 
+@pytest.mark.parametrize("kind", [SimImu, SimRangeScanner])
+def test_what_is_lost_is_counted_and_leaves_a_gap(kind):
+    world = MujocoWorld(SCENE, WorldSettings())
+    device = kind(kind.Settings(loss_probability=0.2), DeviceSetup("device", 1, lambda: world.now_ns, world))
+    world.compile()
+    device.open()
+    sequence = [sample.stamp.sequence for sample in run(world, device, 3.0)]
+    lost = sequence[-1] + 1 - len(sequence)
+    assert np.all(np.diff(sequence) >= 1)
+    assert 0 <= device.health().dropped - lost <= 3  # what is on its way may be lost, too
+    assert 0.1 < lost / sequence[-1] < 0.3
+
+
 def test_the_same_seed_gives_the_same_run_bit_for_bit(sensor):
     def samples(seed):
         world, device = built(sensor[0], seed)

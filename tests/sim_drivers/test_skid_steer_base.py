@@ -15,7 +15,7 @@ from sim_drivers.world import MujocoWorld, WorldSettings
 MS = 1_000_000
 ORIGIN = SE2()
 EXACT = {"wheel_radius_error": (0.0, 0.0, 0.0, 0.0)}
-QUIET = {"jitter_counts": 0.0, "dropout_probability": 0.0}
+QUIET = {"jitter_counts": 0.0, "loss_probability": 0.0}
 
 
 def make(seed=1, static=(), start=ORIGIN, **settings):
