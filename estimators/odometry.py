@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -27,6 +27,8 @@ class OdometryEstimate:
     covariance: F64  # (3, 3): x, y [m], yaw [rad]
     newest_capture_ns: int | None  # None: nothing came yet
     faults: tuple[EstimatorFault, ...]
+    slipping: bool = False  # the wheels contradict the inertial unit now
+    dropped: int = 0  # samples since the start that could not be used
 
 
 class Odometry(Stateful, Protocol):
@@ -84,6 +86,11 @@ class PoseTrail:
         self._twist = twist
         stale = max(0, bisect_right(self._times_ns, time_ns - self._span_ns) - 1)  # one is kept from before the span
         del self._times_ns[:stale], self._poses[:stale]
+
+    def rewind(self, time_ns: int) -> None:
+        """Forget the poses from a time on, so that others can take their place."""
+        kept = bisect_left(self._times_ns, time_ns)
+        del self._times_ns[kept:], self._poses[kept:]
 
     def at(self, time_ns: int) -> SE2:
         """Return the pose at a time; the oldest one for what lies before the trail."""

@@ -1,0 +1,230 @@
+"""How one sample changes what the odometry's extended Kalman filter knows: inertial unit, wheels, absolute pose."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from drivers.interface.geometry import SE2, wrap_angle
+from drivers.interface.kinematics import WheelKinematics
+from drivers.interface.samples import ImuSample, PoseSample, WheelSample
+from estimators.ekf_algebra import Algebra
+from estimators.ekf_model import BIASES, GYRO_BIAS, POSE, STATES, VELOCITY, WAY, YAW, Inertial, transition
+from estimators.ekf_settings import EkfSettings
+from estimators.ekf_state import EkfState
+from estimators.odometry import SECOND_NS, is_plausible
+from estimators.odometry_limits import MotionLimits
+from estimators.wheel_way import WheelModel, WheelWay
+
+Sample = ImuSample | WheelSample | PoseSample
+VELOCITY_STD_M_S = 0.5  # of a velocity of which nothing is known
+LOST_STD = (0.5, 0.5, 0.5)  # m, m, rad: what the pose loses while nothing is sensed for too long
+_WAY_ROWS = np.eye(STATES)[WAY]  # (3, 11)
+_POSE_ROWS = np.eye(STATES)[POSE]  # (3, 11)
+
+
+class MotionFilter:
+    """Folds samples into states, in the order of their capture times; bad ones are counted in the state and change no more."""
+
+    def __init__(self, settings: EkfSettings, limits: MotionLimits, kinematics: WheelKinematics | None) -> None:
+        """Without kinematics wheel samples are of no use."""
+        self._settings, self._limits = settings, limits
+        self._wheels = None if kinematics is None else WheelModel(settings, kinematics)
+        self._algebra = Algebra(settings.innovation_gate, settings.skip_ratio)
+        s = settings
+        self._walk_std = np.array((s.gyro_walk_rad_s2_sqrt_hz, s.accel_walk_m_s3_sqrt_hz, s.accel_walk_m_s3_sqrt_hz))
+        self._prior = np.zeros(STATES)  # variances at the start
+        self._prior[VELOCITY] = VELOCITY_STD_M_S**2
+        self._prior[BIASES] = s.gyro_bias_std_rad_s**2, s.accel_bias_std_m_s2**2, s.accel_bias_std_m_s2**2
+
+    def start(self) -> EkfState:
+        """Return the state before any sample: at the identity of odom."""
+        x = np.zeros(STATES)
+        x[GYRO_BIAS] = self._limits.gyro_bias_rad_s
+        return EkfState(x, np.diag(self._prior))
+
+    def fold(self, state: EkfState, sample: Sample) -> EkfState:
+        """Return the state after a sample that was captured no earlier than the state."""
+        match sample:
+            case ImuSample():
+                after = self._fold_inertial(state, sample)
+            case WheelSample():
+                after = self._fold_wheels(state, sample)
+            case PoseSample():
+                after = self._fold_pose(state, sample)
+        return self._checked(state, after, sample.stamp.captured_ns)
+
+    def _fold_inertial(self, state: EkfState, sample: ImuSample) -> EkfState:
+        s, (fx, fy, fz), captured_ns = self._settings, sample.accel_m_s2, sample.stamp.captured_ns
+        rate = sample.gyro_rad_s[2] * self._limits.gyro_scale
+        force = math.sqrt(fx * fx + fy * fy + fz * fz)
+        if not abs(rate) <= self._limits.turn_rate_max_rad_s or not s.accel_min_m_s2 <= force <= s.accel_max_m_s2:
+            return state._replace(dropped=state.dropped + 1)
+        recent = self._gyro_is_recent(state, captured_ns)
+        mean_rate = 0.5 * (state.rate_rad_s + rate) if recent else rate
+        old = state.force_m_s2 if recent and state.force_m_s2 is not None else (fx, fy)
+        mean_force = 0.5 * (old[0] + fx), 0.5 * (old[1] + fy)
+        moved = self._to(state, captured_ns, mean_rate, mean_force, known=recent)
+        return moved._replace(rate_rad_s=rate, force_m_s2=(fx, fy), gyro_ns=captured_ns)
+
+    def _fold_wheels(self, state: EkfState, sample: WheelSample) -> EkfState:
+        model, captured_ns = self._wheels, sample.stamp.captured_ns
+        if model is None or not model.usable(sample):
+            return state._replace(dropped=state.dropped + 1)
+        if state.wheels_ns is None or state.wheels_rad is None:
+            return self._anchored(self._held(state, captured_ns), sample)
+        elapsed_s = (captured_ns - state.wheels_ns) / SECOND_NS
+        way = model.way(state.wheels_rad, sample, elapsed_s)
+        if not self._plausible(way, elapsed_s):  # a counter jumped, wrapped or was reset
+            after = self._anchored(self._held(state, captured_ns), sample)
+            return after._replace(dropped=state.dropped + 1)
+        if state.time_ns == state.wheels_ns and not self._gyro_is_recent(state, captured_ns):
+            return self._anchored(self._reckoned(state, way, captured_ns), sample)
+        after = self._held(state, captured_ns)
+        if after.wheels_ns is not None:
+            if self._stands(state, sample):
+                way = model.standstill()
+            after = self._gated(after, way, captured_ns)
+        return self._anchored(after, sample)
+
+    def _fold_pose(self, state: EkfState, sample: PoseSample) -> EkfState:
+        """Fold in an absolute pose; the first one says where the device's own frame lies."""
+        pose, covariance, s = sample.local_from_base, sample.covariance, self._settings
+        finite = math.isfinite(pose.x + pose.y + pose.yaw) and covariance.shape == (3, 3) and np.isfinite(covariance).all()
+        if not finite or (np.diag(covariance) < 0.0).any():
+            return state._replace(dropped=state.dropped + 1)
+        if sample.twist is not None and sample.twist.finite and not self._gyro_is_recent(state, sample.stamp.captured_ns):
+            state = state._replace(rate_rad_s=sample.twist.wz + float(state.x[GYRO_BIAS]))
+        before = self._held(state, sample.stamp.captured_ns)
+        if before.local_from_odom is None:
+            return before._replace(local_from_odom=pose @ before.pose.inverse())
+        measured, believed = before.local_from_odom.inverse() @ pose, before.pose
+        innovation = np.array((measured.x - believed.x, measured.y - believed.y, wrap_angle(measured.yaw - believed.yaw)))
+        c, sn = math.cos(before.local_from_odom.yaw), math.sin(before.local_from_odom.yaw)
+        odom_from_local = np.array(((c, sn, 0.0), (-sn, c, 0.0), (0.0, 0.0, 1.0)))
+        floor = np.diag((s.pose_std_min_m**2, s.pose_std_min_m**2, s.yaw_std_min_rad**2))
+        noise = odom_from_local @ (0.5 * (covariance + covariance.T)) @ odom_from_local.T + floor
+        weight = self._algebra.weight(before, innovation, _POSE_ROWS, noise)
+        if weight == 0.0:
+            return before._replace(dropped=before.dropped + 1)
+        x, covariance = self._algebra.correct(before, innovation, _POSE_ROWS, noise / weight)
+        return before._replace(x=x, covariance=covariance)
+
+    def _gyro_is_recent(self, state: EkfState, time_ns: int) -> bool:
+        return state.gyro_ns is not None and time_ns - state.gyro_ns <= self._settings.gap_max_s * SECOND_NS
+
+    def _plausible(self, way: WheelWay, elapsed_s: float) -> bool:
+        limits = self._limits.speed_max_m_s, self._limits.turn_rate_max_rad_s
+        turned = SE2(way.motion.x, way.motion.y, way.turned_rad)
+        reported = SE2(way.twist.vx, way.twist.vy, way.twist.wz)
+        return is_plausible(turned, elapsed_s, *limits) and is_plausible(reported, 1.0, *limits)
+
+    def _held(self, state: EkfState, time_ns: int) -> EkfState:
+        """Carry a state on with what the inertial unit said last."""
+        known = self._gyro_is_recent(state, time_ns)
+        return self._to(state, time_ns, state.rate_rad_s, state.force_m_s2 if known else None, known=known)
+
+    def _to(self, state: EkfState, time_ns: int, rate: float, force: tuple[float, float] | None, *, known: bool) -> EkfState:
+        s = self._settings
+        if state.time_ns is None or time_ns == state.time_ns:
+            return state._replace(time_ns=time_ns)
+        dt_s = (time_ns - state.time_ns) / SECOND_NS
+        if dt_s > s.blind_max_s:
+            return self._lost(state, time_ns)
+        rate_std = s.gyro_noise_rad_s_sqrt_hz if known else s.blind_turn_rad_s_sqrt_hz
+        fx, fy = force if force is not None and known else (None, 0.0)
+        force_std = s.blind_accel_m_s2_sqrt_hz if fx is None else s.accel_noise_m_s2_sqrt_hz
+        inertial = Inertial(rate, fx, fy, rate_std, force_std)
+        x, covariance = self._algebra.propagate(state, *transition(state.x, inertial, self._walk_std, dt_s))
+        return state._replace(x=x, covariance=covariance, time_ns=time_ns)
+
+    def _lost(self, state: EkfState, time_ns: int) -> EkfState:
+        """Go on after a time without any sample: velocity and way are unknown, and the pose is less certain."""
+        x, covariance = state.x.copy(), state.covariance.copy()
+        x[VELOCITY] = 0.0
+        covariance[VELOCITY] = covariance[:, VELOCITY] = 0.0
+        covariance[VELOCITY, VELOCITY] = np.diag(self._prior[VELOCITY])
+        covariance[POSE, POSE] += np.diag(np.square(LOST_STD))
+        return state._replace(x=x, covariance=covariance, time_ns=time_ns, wheels_ns=None, wheels_rad=None)
+
+    def _anchored(self, state: EkfState, sample: WheelSample) -> EkfState:
+        """Count the way anew from this sample."""
+        x, covariance = state.x.copy(), state.covariance.copy()
+        x[WAY] = 0.0
+        covariance[WAY] = covariance[:, WAY] = 0.0
+        captured_ns, angles = sample.stamp.captured_ns, sample.position_rad.copy()
+        state = state._replace(x=x, covariance=covariance, wheels_ns=captured_ns, wheels_rad=angles)
+        if state.still_rad is None or np.abs(angles - state.still_rad).max() > self._settings.still_rad:
+            return state._replace(still_ns=captured_ns, still_rad=angles)
+        return state
+
+    def _stands(self, state: EkfState, sample: WheelSample) -> bool:
+        """Tell whether the wheels have stood for a while, and still do (zero-velocity update).
+
+        The gyro must agree, as far as its bias is known: it notices first that a base sets off.
+        """
+        if state.still_ns is None or state.still_rad is None:
+            return False
+        s = self._settings
+        bias_std = math.sqrt(float(state.covariance[GYRO_BIAS, GYRO_BIAS]))
+        if abs(state.rate_rad_s - float(state.x[GYRO_BIAS])) > s.still_rate_rad_s + 3.0 * bias_std:
+            return False
+        long = sample.stamp.captured_ns - state.still_ns >= s.still_after_s * SECOND_NS
+        return long and float(np.abs(sample.position_rad - state.still_rad).max()) <= s.still_rad
+
+    def _reckoned(self, state: EkfState, way: WheelWay, time_ns: int) -> EkfState:
+        """Move by the wheels alone, where no inertial unit says anything (Thrun, Probabilistic Robotics, section 5.4)."""
+        pose, x = state.pose @ way.motion, state.x.copy()
+        c, s = math.cos(state.pose.yaw), math.sin(state.pose.yaw)
+        x[POSE] = pose.x, pose.y, state.x[YAW] + way.turned_rad
+        x[VELOCITY] = way.twist.vx, way.twist.vy
+        jacobian = np.eye(STATES)
+        jacobian[0, YAW] = -s * way.motion.x - c * way.motion.y
+        jacobian[1, YAW] = c * way.motion.x - s * way.motion.y
+        jacobian[VELOCITY, VELOCITY] = 0.0
+        noise = np.zeros((STATES, STATES))
+        odom_from_base = np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
+        noise[POSE, POSE] = odom_from_base @ way.covariance @ odom_from_base.T
+        noise[VELOCITY, VELOCITY] = np.eye(2) * self._settings.blind_accel_m_s2_sqrt_hz**2
+        mean, covariance = self._algebra.propagate(state, x, jacobian, noise)
+        rate = way.twist.wz + float(state.x[GYRO_BIAS])
+        return state._replace(x=mean, covariance=covariance, time_ns=time_ns, rate_rad_s=rate, slipping=False)
+
+    def _gated(self, state: EkfState, way: WheelWay, time_ns: int) -> EkfState:
+        """Correct by the wheels as far as they agree; wheels that slip or stall do not, and are eased or left out."""
+        innovation = way.vector - state.x[WAY]
+        weight = self._algebra.weight(state, innovation, _WAY_ROWS, way.grip)
+        if weight < 1.0:
+            since_ns = time_ns if state.rejected_ns is None else state.rejected_ns
+            if time_ns - since_ns > self._settings.diverged_after_s * SECOND_NS:
+                return self._begun_anew(state, way)
+            state = state._replace(slipping=True, rejected_ns=since_ns)
+        else:
+            state = state._replace(slipping=False, rejected_ns=None)
+        if weight == 0.0:
+            return state
+        x, covariance = self._algebra.correct(state, innovation, _WAY_ROWS, way.covariance / weight)
+        return state._replace(x=x, covariance=covariance)
+
+    def _begun_anew(self, state: EkfState, way: WheelWay) -> EkfState:
+        """Keep the pose, believe the wheels, and learn velocity and biases again."""
+        x, covariance = state.x.copy(), np.zeros((STATES, STATES))
+        x[VELOCITY], x[BIASES] = (way.twist.vx, way.twist.vy), (self._limits.gyro_bias_rad_s, 0.0, 0.0)
+        covariance[POSE, POSE] = state.covariance[POSE, POSE] + np.diag(np.square(LOST_STD))
+        covariance += np.diag(self._prior)
+        return state._replace(x=x, covariance=covariance, rejected_ns=None, diverged=state.diverged + 1)
+
+    def _checked(self, before: EkfState, after: EkfState, time_ns: int) -> EkfState:
+        """Return the state after a sample if it can be true; else one that begins anew."""
+        bias, spread = float(after.x[GYRO_BIAS]) - self._limits.gyro_bias_rad_s, after.covariance.ravel()
+        finite = math.isfinite(after.x.dot(after.x) + spread.dot(spread))
+        if finite and abs(bias) <= self._settings.gyro_bias_max_rad_s:
+            return after
+        fresh = self.start()
+        x = fresh.x.copy()
+        x[POSE] = before.x[POSE]
+        covariance = fresh.covariance.copy()
+        covariance[POSE, POSE] = before.covariance[POSE, POSE] + np.diag(np.square(LOST_STD))
+        state = fresh._replace(x=x, covariance=covariance, time_ns=time_ns, local_from_odom=before.local_from_odom)
+        return state._replace(dropped=before.dropped, diverged=before.diverged + 1)

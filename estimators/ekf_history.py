@@ -1,0 +1,78 @@
+"""The recent past of a filter: samples in the order of their capture, with the state after each, to go back to."""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterable
+
+from drivers.interface.samples import ImuSample, WheelSample
+from estimators.ekf_filter import MotionFilter, Sample
+from estimators.ekf_state import EkfState
+
+Key = tuple[int, int]  # capture time [ns], kind: what is sorted by; no two samples share one
+
+
+def key_of(sample: Sample) -> Key:
+    """Return where a sample belongs; of samples captured together the inertial unit's comes first, an absolute pose last."""
+    kind = 0 if isinstance(sample, ImuSample) else 1 if isinstance(sample, WheelSample) else 2
+    return sample.stamp.captured_ns, kind
+
+
+class History:
+    """A sorted window of samples.  A late one is put in its place and all after it are folded again, from the state before it.
+
+    So the order of arrival leaves no trace: the states are those of the sorted samples, bit for bit.
+    """
+
+    def __init__(self, motion: MotionFilter, span_ns: int) -> None:
+        """Begin with nothing; keep what is younger than `span_ns` before the newest sample."""
+        self._motion, self._span_ns = motion, span_ns
+        self.base = motion.start()  # before the first sample kept
+        self.samples: list[Sample] = []
+        self._keys: list[Key] = []
+        self.states: list[EkfState] = []  # after each sample
+
+    @property
+    def newest(self) -> EkfState:
+        """The state after every sample."""
+        return self.states[-1] if self.states else self.base
+
+    def insert(self, samples: Iterable[Sample]) -> tuple[int, int]:
+        """Fold samples in; return the place of the first state that is new, and how many samples were no good.
+
+        No good are those from before the window and those whose place is taken: a time stamp that repeats.
+        """
+        first, refused = len(self.samples), 0
+        for sample in samples:
+            key = key_of(sample)
+            place = bisect_left(self._keys, key)
+            taken = place < len(self._keys) and self._keys[place] == key
+            if taken or (self.base.time_ns is not None and key[0] <= self.base.time_ns):
+                refused += 1
+                continue
+            self._keys.insert(place, key)
+            self.samples.insert(place, sample)
+            first = min(first, place)
+        self._replay(first)
+        return first, refused
+
+    def forget(self) -> None:
+        """Let go of what is older than the window; one state from before it stays as the base."""
+        if not self._keys:
+            return
+        stale = bisect_right(self._keys, (self._keys[-1][0] - self._span_ns, 2))
+        if stale > 0:
+            self.base = self.states[stale - 1]
+            del self._keys[:stale], self.samples[:stale], self.states[:stale]
+
+    def restore(self, base: EkfState, samples: list[Sample]) -> None:
+        """Take over a base and the samples after it."""
+        self.base, self.samples, self._keys, self.states = base, samples, [key_of(sample) for sample in samples], []
+        self._replay(0)
+
+    def _replay(self, first: int) -> None:
+        del self.states[first:]
+        state = self.newest
+        for sample in self.samples[first:]:
+            state = self._motion.fold(state, sample)
+            self.states.append(state)

@@ -1,0 +1,38 @@
+"""Which kind of odometry runs, and what all kinds are told."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from drivers.interface.kinematics import WheelKinematics
+from estimators.dead_reckoning import DeadReckoning, DeadReckoningSettings
+from estimators.ekf_odometry import EkfOdometry
+from estimators.ekf_settings import EkfSettings
+from estimators.odometry import Odometry
+from estimators.odometry_limits import MotionLimits
+from estimators.wheel_geometry import OmniGeometry, SkidSteerGeometry
+
+Geometry = Annotated[OmniGeometry | SkidSteerGeometry, Field(discriminator="kind")]
+
+
+class OdometrySettings(DeadReckoningSettings):
+    """Dead reckoning's own settings, those that both kinds share, and the filter's."""
+
+    kind: Literal["dead_reckoning", "ekf"] = Field(default="dead_reckoning", description="wheels alone, or fused with the IMU")
+    geometry: Geometry | None = Field(default=None, description="as calibrated; none: the base's own")
+    gyro_bias_rad_s: float = Field(default=0.0, ge=-1.0, le=1.0, description="as calibrated: true rate = scale * gyro - bias")
+    gyro_scale: float = Field(default=1.0, ge=0.5, le=2.0, description="as calibrated")
+    ekf: EkfSettings = EkfSettings()
+
+
+def build_odometry(settings: OdometrySettings, kinematics: WheelKinematics | None) -> Odometry:
+    """Return the odometry that the settings name; a calibrated geometry takes the place of the base's own `kinematics`."""
+    if settings.geometry is not None:
+        kinematics = settings.geometry.kinematics
+    if settings.kind == "dead_reckoning":
+        return DeadReckoning(settings, kinematics)
+    limits = MotionLimits(settings.speed_max_m_s, settings.turn_rate_max_rad_s, settings.gyro_bias_rad_s, settings.gyro_scale)
+    trail_s, beyond_s = settings.trail_s, settings.extrapolation_max_s
+    return EkfOdometry(settings.ekf, limits, kinematics, trail_s=trail_s, extrapolation_max_s=beyond_s)
