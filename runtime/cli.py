@@ -6,6 +6,7 @@ import math
 import os
 import signal
 import sys
+from json import dumps
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +14,7 @@ import typer
 from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
+from rich.text import Text
 
 from drivers.interface.errors import ConfigurationError, TrundleError
 from runtime import registry, yaml_files
@@ -110,14 +112,30 @@ def evaluate(
 @app.command(name="list")
 def list_() -> None:
     """List everything that a name can choose, with one line each, and the shipped configurations, robots and experiments."""
+    table = Table.grid(padding=(0, 2), expand=False)
     for part in registry.Part:
-        table = Table(title=f"{part.noun}s", title_justify="left", show_header=False, box=None, padding=(0, 2))
+        table.add_row(f"[bold]{part.noun}s")
         for name in registry.names(part):
-            table.add_row(f"  {name}", registry.first_line(part, name))
-        console.print(table)
+            table.add_row(f"  {name}", Text(registry.first_line(part, name)))
+    table.add_row("[bold]shipped files")
     for folder in ("scenarios", "robots", "experiments"):
-        title = "configurations" if folder == "scenarios" else folder
-        console.print(f"{title} (configs/{folder})\n  {', '.join(yaml_files.shipped(folder))}")
+        table.add_row(f"  configs/{folder}", ", ".join(yaml_files.shipped(folder)))
+    console.print(table)
+
+
+@app.command()
+def schema(
+    out: Annotated[Path | None, typer.Option(help="write it here instead of printing it")] = None,
+) -> None:
+    """Print the JSON schema of a configuration, with the settings of every part, for editors that check YAML."""
+    from runtime import schema as schemas  # noqa: PLC0415 - imported here, as above
+
+    require_writable(out, "--out")
+    text = dumps(schemas.schema(), indent=2)
+    if out is None:
+        typer.echo(text)
+    else:
+        write_text(out, text + "\n")
 
 
 @app.command()

@@ -94,8 +94,8 @@ class RunReport:
         for name, time in self.stage_ms.items():
             rows.append((f"{name} [ms]", f"p50 {time.p50:.3f}   p99 {time.p99:.3f}   max {time.max:.3f}"))
         for fault in self.faults:
-            where = f"{fault.device}: " if fault.device else ""
-            rows.append((fault.fault, f"{fault.ticks} ticks, first at {fault.first_tick}: {where}{fault.detail}"))
+            told = (f"{fault.ticks} ticks, first at {fault.first_tick}", fault.device, fault.detail)
+            rows.append((fault.fault, ": ".join(word for word in told if word)))
         rows += [("not granted", sentence) for sentence in self.realtime_refused]
         if self.recording is not None:
             size = f"{self.recording.path} ({self.recording.bytes / 1e6:.1f} MB)"
