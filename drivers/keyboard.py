@@ -43,7 +43,9 @@ class KeyboardSettings(Settings):
 
 
 class KeyboardOperator:
-    """Reads single keys in its own thread: space e-stop, r reset, p pause or resume, e enable or disable, arrows or wasd jog.
+    """The keyboard of the terminal that the robot was started from.
+
+    It reads single keys in its own thread: space e-stop, r reset, p pause or resume, e enable or disable, arrows or wasd jog.
 
     An unknown key does nothing.  `close` gives the terminal back as it was.  Ctrl-C stays what it is.
     """

@@ -36,7 +36,9 @@ class RecordedDepthSettings(Settings):
 
 
 class RecordedDepthCamera:
-    """Plays frame k as captured at `open + k / rate_hz`; what fell due unread between two calls of `latest` is dropped.
+    """Plays a folder of depth images as a camera.
+
+    Frame k is played as captured at `open + k / rate_hz`; what fell due unread between two calls of `latest` is dropped.
 
     A file is decoded when its frame is asked for; one that cannot be decoded is dropped too.
     """

@@ -35,7 +35,9 @@ class RecordedWheelSettings(Settings):
 
 
 class RecordedWheelBase:
-    """Delivers each recorded sample when its time has come, counted from the first at `open`.
+    """Plays a recorded drive of a differential-drive base.
+
+    It delivers each recorded sample when its time has come, counted from the first at `open`.
 
     It takes commands as any base does, and does nothing with them: what was driven was driven.  Wheel angles are the rates
     integrated by the trapezoidal rule.  Nothing overflows, since the file keeps what was not yet drained.

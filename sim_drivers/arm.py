@@ -45,7 +45,7 @@ class ArmSettings(Settings):
 
 
 class SimArm:
-    """Position servos with gravity compensation, fed at 1 kHz by a `TrajectoryFollower`."""
+    """A simulated seven-joint Franka arm: position servos with gravity compensation, fed at 1 kHz by a `TrajectoryFollower`."""
 
     Settings: ClassVar[type[Settings]] = ArmSettings
     role: ClassVar[str] = "arm"

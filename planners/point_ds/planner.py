@@ -30,7 +30,7 @@ class PointAttractorDiagnostics(Diagnostics):
 
 
 class PointAttractor:
-    """Drives straight to the attractor, in the body frame of a base that can move in every direction."""
+    """Point attractor: drives straight to it, in the body frame of a base that can move in every direction."""
 
     Settings = PointAttractorSettings
     default_shield: ClassVar[str] = "field_cbf"

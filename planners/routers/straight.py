@@ -17,7 +17,7 @@ _SPACING_M = 0.25
 
 
 class StraightRouter:
-    """Joins robot and goal, whatever lies between."""
+    """Straight line: joins robot and goal, whatever lies between."""
 
     class Settings(Settings):
         """It has none."""

@@ -33,7 +33,7 @@ class FieldCbfDiagnostics(Diagnostics):
 
 
 class FieldCbf:
-    """Projects the asked velocity onto the half-planes of up to `directions` boundary samples, inside what is reachable."""
+    """Multi-boundary field-CBF: projects the asked velocity onto the half-planes of up to `directions` boundary samples, inside what is reachable."""
 
     class Settings(Settings):
         """Appendix B, layer 3: multi-boundary field-CBF."""

@@ -11,7 +11,7 @@ from planners.shield import Filtered, ReachableSet, ShieldSetup
 
 
 class NoShield:
-    """Clips, and knows of no obstacle."""
+    """No shield: clips, and knows of no obstacle."""
 
     class Settings(Settings):
         """It has none."""
