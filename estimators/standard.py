@@ -14,7 +14,6 @@ from drivers.interface.settings import Settings
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import FREE, Belief, EstimatorFault, Track
 from estimators.clearance import ClearanceEstimator, ClearanceSettings
-from estimators.dead_reckoning import DeadReckoning, DeadReckoningSettings
 from estimators.depth_grid import DepthGrid, DepthGridSettings
 from estimators.estimator import EstimatorSetup
 from estimators.grid_filter import GridFilter
@@ -22,6 +21,7 @@ from estimators.joint_state import pack_joints, unpack_joints
 from estimators.labelling import FrameLabels, FrameSource
 from estimators.memory import MemorySettings, memory_of
 from estimators.odometry import Odometry, OdometryEstimate, latest_valid_ns
+from estimators.odometry_choice import OdometrySettings, build_odometry
 from estimators.scan_grid import ScanGrid, ScanGridSettings
 from estimators.truth_odometry import TruthOdometry
 from estimators.truth_tracks import tracks_from_truth
@@ -34,7 +34,7 @@ class StandardSettings(Settings):
     tracks: Literal["none", "truth"] = Field(default="none", description="where tracks of obstacles come from")
     source: Literal["depth", "scan"] = Field(default="depth", description="which sensor the grid is made from")
     cell_m: float = Field(default=0.05, ge=0.01, le=0.5, description="side of a cell of grid and clearance field")
-    odometry: DeadReckoningSettings = DeadReckoningSettings()
+    odometry: OdometrySettings = OdometrySettings()
     depth: DepthGridSettings = DepthGridSettings()
     scan: ScanGridSettings = ScanGridSettings()
     memory: MemorySettings = MemorySettings()
@@ -159,4 +159,4 @@ def _odometry_of(settings: StandardSettings, setup: EstimatorSetup) -> Odometry:
     odometry = settings.odometry
     if settings.pose == "truth":
         return TruthOdometry(setup.map_from_start, odometry.trail_s, odometry.extrapolation_max_s)
-    return DeadReckoning(odometry, setup.kinematics)
+    return build_odometry(odometry, setup.kinematics)

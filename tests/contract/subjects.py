@@ -19,6 +19,7 @@ from tests.contract.streams import BASES, MISSION, PERIOD_S, RADIUS_M, Stream, b
 VARIANTS: dict[str, tuple[dict[str, Any], ...]] = {
     "standard": (
         {"source": "scan", "odometry": {"use_gyro": True}},
+        {"source": "scan", "odometry": {"kind": "ekf"}},
         {"pose": "truth", "tracks": "truth"},
         {"memory": {"kind": "layers"}, "depth": {"filtered": True}},
     ),
