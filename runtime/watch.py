@@ -50,7 +50,9 @@ class DeviceWatch:
 
     def _from_health(self, health: DeviceHealth, seen: _Seen) -> list[FaultReport]:
         found = []
-        if health.state is DeviceState.FAULTED or health.fault:
+        if health.state is DeviceState.RECONNECTING:
+            found.append(FaultReport(Fault.SILENT_DEVICE, health.device, health.fault or "it is being reconnected"))
+        elif health.state is DeviceState.FAULTED or health.fault:
             found.append(FaultReport(Fault.DEVICE_FAULT, health.device, health.fault))
         if health.expired_commands > seen.expired_commands:
             seen.expired_commands = health.expired_commands

@@ -31,7 +31,8 @@ class DeviceState(enum.Enum):
 
     CLOSED = "closed"
     OPEN = "open"
-    FAULTED = "faulted"
+    RECONNECTING = "reconnecting"  # it was lost; its own reader tries to get it back
+    FAULTED = "faulted"  # will not come back by itself
     ENDED = "ended"  # a recording that has been played to its end
 
 
@@ -41,7 +42,7 @@ class DeviceHealth:
 
     device: str
     state: DeviceState
-    fault: str = ""  # one sentence, empty when there is none
+    fault: str = ""  # one sentence on why it is faulted or reconnecting; empty when all is well
     received: int = 0
     dropped: int = 0  # failed its checksum, counter or range check, or lost on the way
     overflowed: int = 0  # came faster than the loop drained
@@ -126,8 +127,8 @@ class MobileBase(Device, Protocol):
         ...
 
     @property
-    def kinematics(self) -> WheelKinematics:
-        """How its wheels and its twist belong together."""
+    def kinematics(self) -> WheelKinematics | None:
+        """How its wheels and its twist belong together; None: it reports poses only."""
         ...
 
     def command(self, twist: BodyTwist, expires_ns: int) -> None:

@@ -284,3 +284,13 @@ def test_a_contact_latches() -> None:
         in guard.admit(FORWARD, belief(10), sensed(10, truth=truth)).faults
     )
     assert guard.admit(FORWARD, belief(11), sensed(11)).response is Response.LATCH
+
+
+def test_a_device_that_is_being_reconnected_stands_the_robot_down_and_latches_nothing() -> None:
+    guard = supervisor()
+    drive(guard, range(20))
+    lost = health(state=DeviceState.RECONNECTING, fault="the cable is out")
+    (verdict,) = drive(guard, range(20, 21), health=(lost,))
+    assert verdict.response is Response.STAND_DOWN
+    assert [(report.fault, report.detail) for report in verdict.faults] == [(Fault.SILENT_DEVICE, "the cable is out")]
+    assert drive(guard, range(21, 22))[0].response is Response.RUN
