@@ -89,7 +89,10 @@ class Mover:
 
 @dataclass(frozen=True, slots=True)
 class Conveyor:
-    """A belt along its own x axis with free boxes on it; its top lies at the shape's full height."""
+    """A belt along its own x axis; its top lies at the shape's full height.
+
+    The items are free bodies: they stand where they are given only until the belt, or the robot, moves them.
+    """
 
     name: str
     shape: Shape
