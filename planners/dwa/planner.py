@@ -43,7 +43,7 @@ class DynamicWindowDiagnostics(Diagnostics):
 
 
 class DynamicWindow:
-    """Dynamic window approach: tries the velocities that can be reached soon and takes the best of those it can stop from in time."""
+    """Dynamic window approach: of the velocities that can be reached soon, the best one that it can stop from in time."""
 
     Settings = DynamicWindowSettings
     default_shield: ClassVar[str] = "none"

@@ -27,7 +27,8 @@ graph_of = lru_cache(maxsize=4)(GridGraph)  # a rolling window alternates betwee
 class GridRouter:
     """Shortest path on the grid, preferring room, around what is occupied and through what is unknown.
 
-    Dijkstra's search on cell costs; the target is the border cell from which path and remainder together cost least."""
+    Dijkstra's search on cell costs; the target is the border cell from which path and remainder together cost least.
+    """
 
     class Settings(GridCosts):
         """Costs of the cells, and how the way is chosen."""

@@ -33,7 +33,10 @@ class FieldCbfDiagnostics(Diagnostics):
 
 
 class FieldCbf:
-    """Multi-boundary field-CBF: projects the asked velocity onto the half-planes of up to `directions` boundary samples, inside what is reachable."""
+    """Multi-boundary field-CBF: the velocity nearest to the asked one that keeps off every near boundary.
+
+    It is projected onto the half-planes of up to `directions` boundary samples, inside what is reachable.
+    """
 
     class Settings(Settings):
         """Appendix B, layer 3: multi-boundary field-CBF."""
