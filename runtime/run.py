@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -77,26 +77,36 @@ class _Run:
         self._wall_s = 0.0
 
     def result(self) -> RunResult:
-        robot, interrupts = self._assembly.robot, self._interrupts
         failure: BaseException | None = None
         with ExitStack() as closing:
             closing.callback(self._assembly.runner.close)
+            closing.callback(self._let_go)
+            self._assembly.robot.open()  # before the recorder: a device that is not there leaves no empty log behind
             closing.callback(self._recorder.close)
             self._recorder.open()
-            robot.open()
-            interrupts.phase = Phase.DRIVING
+            self._interrupts.phase = Phase.DRIVING
             pacer, referee = self._assembly.pacer(), self._referee()
             try:
                 self._drive(pacer, referee)
             except BaseException as error:  # noqa: BLE001 - the report must be made; it is raised after that
                 failure = error
-            interrupts.phase = Phase.CLOSING
-            for end in (robot.stop, robot.close):
-                try:
-                    end()
-                except DeviceError as error:
-                    failure = failure or error
+            self._interrupts.phase = Phase.CLOSING
+            failure = self._stopped() or failure
         return RunResult(self._report(pacer, referee, self._recorder.close(), failure), failure)
+
+    def _stopped(self) -> DeviceError | None:
+        """Stop and close the robot; return what a device had against it, as that matters more than what ended the run."""
+        failures = []
+        for end in (self._assembly.robot.stop, self._assembly.robot.close):
+            try:
+                end()
+            except DeviceError as error:
+                failures.append(error)
+        return failures[0] if failures else None
+
+    def _let_go(self) -> None:
+        with suppress(DeviceError):  # after a run it has been closed already, and the failure was kept
+            self._assembly.robot.close()
 
     def _referee(self) -> Referee:
         return Referee(

@@ -62,3 +62,13 @@ def test_an_existing_log_is_not_overwritten(tmp_path: Path, capsys: pytest.Captu
     assert run_command(["run", "door", "--log", str(log)]) == 2
     assert "exists already; --force overwrites it" in capsys.readouterr().err
     assert log.read_bytes() == b"precious"
+
+
+def test_a_device_that_is_not_there_is_exit_code_3_and_leaves_nothing_behind(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.stdin", None)
+    assert run_command(["run", "door", "--set", "robot.operator={driver: keyboard}"]) == 3
+    assert "error: operator: the keyboard operator needs a terminal" in " ".join(capsys.readouterr().err.split())
+    assert not list(tmp_path.rglob("*.rrd"))
