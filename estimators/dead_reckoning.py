@@ -50,6 +50,9 @@ class DeadReckoning:
         self._device_pose: SE2 | None = None  # local_from_base, at the newest sample
         self._gyro: list[tuple[int, float]] = []  # capture time [ns] and yaw rate [rad/s], not yet used
 
+    def warm_up(self) -> None:
+        """Do nothing: there is no kernel."""
+
     def update(self, sensed: Sensed) -> OdometryEstimate:
         """Fold in every sample at its own capture time, then carry the last twist on to the tick."""
         latest_ns = latest_valid_ns(sensed)

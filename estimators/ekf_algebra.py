@@ -6,10 +6,13 @@ from typing import Any
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
+from numba import njit
 
 from estimators.belief import F64
 from estimators.ekf_model import STATES
 from estimators.ekf_state import EkfState
+
+_IDENTITY = np.eye(STATES)
 
 
 class Algebra(ExtendedKalmanFilter):  # type: ignore[misc]  # FilterPy is untyped
@@ -31,16 +34,21 @@ class Algebra(ExtendedKalmanFilter):  # type: ignore[misc]  # FilterPy is untype
         self.predict()
         return self.x, self.P
 
-    def correct(self, state: EkfState, innovation: F64, rows: F64, noise: F64) -> tuple[F64, F64]:
-        """Return mean and covariance after a measurement whose Jacobian is `rows`, shape (m, 11)."""
-        self.x, self.P = state.x, state.covariance
+    def correct(self, state: EkfState, innovation: F64, measured: slice, noise: F64) -> tuple[F64, F64]:
+        """Return mean and covariance after a measurement of a part of the state."""
+        self.x, self.P, rows = state.x, state.covariance, _IDENTITY[measured]
         self.update(innovation, lambda _: rows, lambda _: 0.0, R=noise)
         return self.x, 0.5 * (self.P + self.P.T)
 
-    def weight(self, state: EkfState, innovation: F64, rows: F64, noise: F64) -> float:
-        """Return how far a measurement is believed: 1 within the gate, less beyond it, 0 far beyond it."""
-        scatter = rows @ state.covariance @ rows.T + noise
-        surprise = float(innovation @ np.linalg.inv(scatter) @ innovation)
+    def weight(self, state: EkfState, innovation: F64, measured: slice, noise: F64) -> float:
+        """Return how far a measurement of a part of the state is believed: 1 within the gate, less beyond it, 0 far beyond it."""
+        surprise = squared_surprise(innovation, state.covariance[measured, measured] + noise)
         if surprise <= self._gate:
             return 1.0
         return self._gate / surprise if surprise <= self._gate * self._skip_ratio else 0.0
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def squared_surprise(innovation: F64, scatter: F64) -> float:
+    """Return the normalised innovation squared of an innovation, shape (m,), with its covariance, shape (m, m)."""
+    return float(innovation @ np.linalg.solve(scatter, innovation))

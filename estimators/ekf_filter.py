@@ -9,7 +9,7 @@ import numpy as np
 from drivers.interface.geometry import SE2, wrap_angle
 from drivers.interface.kinematics import WheelKinematics
 from drivers.interface.samples import ImuSample, PoseSample, WheelSample
-from estimators.ekf_algebra import Algebra
+from estimators.ekf_algebra import Algebra, squared_surprise
 from estimators.ekf_model import BIASES, GYRO_BIAS, POSE, STATES, VELOCITY, WAY, YAW, Inertial, transition
 from estimators.ekf_settings import EkfSettings
 from estimators.ekf_state import EkfState
@@ -20,8 +20,6 @@ from estimators.wheel_way import WheelModel, WheelWay
 Sample = ImuSample | WheelSample | PoseSample
 VELOCITY_STD_M_S = 0.5  # of a velocity of which nothing is known
 LOST_STD = (0.5, 0.5, 0.5)  # m, m, rad: what the pose loses while nothing is sensed for too long
-_WAY_ROWS = np.eye(STATES)[WAY]  # (3, 11)
-_POSE_ROWS = np.eye(STATES)[POSE]  # (3, 11)
 
 
 class MotionFilter:
@@ -43,6 +41,11 @@ class MotionFilter:
         x = np.zeros(STATES)
         x[GYRO_BIAS] = self._limits.gyro_bias_rad_s
         return EkfState(x, np.diag(self._prior))
+
+    def warm_up(self) -> None:
+        """Compile the motion model and the gate."""
+        squared_surprise(np.zeros(3), np.eye(3))
+        transition(np.zeros(STATES), Inertial(0.0, 0.0, 0.0, True, 1.0, 1.0), self._walk_std, 0.01)
 
     def fold(self, state: EkfState, sample: Sample) -> EkfState:
         """Return the state after a sample that was captured no earlier than the state."""
@@ -105,10 +108,10 @@ class MotionFilter:
         odom_from_local = np.array(((c, sn, 0.0), (-sn, c, 0.0), (0.0, 0.0, 1.0)))
         floor = np.diag((s.pose_std_min_m**2, s.pose_std_min_m**2, s.yaw_std_min_rad**2))
         noise = odom_from_local @ (0.5 * (covariance + covariance.T)) @ odom_from_local.T + floor
-        weight = self._algebra.weight(before, innovation, _POSE_ROWS, noise)
+        weight = self._algebra.weight(before, innovation, POSE, noise)
         if weight == 0.0:
             return before._replace(dropped=before.dropped + 1)
-        x, covariance = self._algebra.correct(before, innovation, _POSE_ROWS, noise / weight)
+        x, covariance = self._algebra.correct(before, innovation, POSE, noise / weight)
         return before._replace(x=x, covariance=covariance)
 
     def _gyro_is_recent(self, state: EkfState, time_ns: int) -> bool:
@@ -133,9 +136,10 @@ class MotionFilter:
         if dt_s > s.blind_max_s:
             return self._lost(state, time_ns)
         rate_std = s.gyro_noise_rad_s_sqrt_hz if known else s.blind_turn_rad_s_sqrt_hz
-        fx, fy = force if force is not None and known else (None, 0.0)
-        force_std = s.blind_accel_m_s2_sqrt_hz if fx is None else s.accel_noise_m_s2_sqrt_hz
-        inertial = Inertial(rate, fx, fy, rate_std, force_std)
+        if known and force is not None:
+            inertial = Inertial(rate, *force, True, rate_std, s.accel_noise_m_s2_sqrt_hz)
+        else:
+            inertial = Inertial(rate, 0.0, 0.0, False, rate_std, s.blind_accel_m_s2_sqrt_hz)
         x, covariance = self._algebra.propagate(state, *transition(state.x, inertial, self._walk_std, dt_s))
         return state._replace(x=x, covariance=covariance, time_ns=time_ns)
 
@@ -194,7 +198,7 @@ class MotionFilter:
     def _gated(self, state: EkfState, way: WheelWay, time_ns: int) -> EkfState:
         """Correct by the wheels as far as they agree; wheels that slip or stall do not, and are eased or left out."""
         innovation = way.vector - state.x[WAY]
-        weight = self._algebra.weight(state, innovation, _WAY_ROWS, way.grip)
+        weight = self._algebra.weight(state, innovation, WAY, way.grip)
         if weight < 1.0:
             since_ns = time_ns if state.rejected_ns is None else state.rejected_ns
             if time_ns - since_ns > self._settings.diverged_after_s * SECOND_NS:
@@ -204,7 +208,7 @@ class MotionFilter:
             state = state._replace(slipping=False, rejected_ns=None)
         if weight == 0.0:
             return state
-        x, covariance = self._algebra.correct(state, innovation, _WAY_ROWS, way.covariance / weight)
+        x, covariance = self._algebra.correct(state, innovation, WAY, way.covariance / weight)
         return state._replace(x=x, covariance=covariance)
 
     def _begun_anew(self, state: EkfState, way: WheelWay) -> EkfState:

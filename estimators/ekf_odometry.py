@@ -38,11 +38,16 @@ class EkfOdometry:
         extrapolation_max_s: float,
     ) -> None:
         """Begin at the identity; keep `trail_s` of the past, and believe the last twist for `extrapolation_max_s`."""
+        self._motion = MotionFilter(settings, limits, kinematics)
         self._late_max_ns = round(settings.late_max_s * SECOND_NS)
         span_s = max(trail_s, settings.late_max_s)
-        self._history = History(MotionFilter(settings, limits, kinematics), round(span_s * SECOND_NS))
+        self._history = History(self._motion, round(span_s * SECOND_NS))
         self._trail = PoseTrail(span_s, extrapolation_max_s)
         self._refused = 0  # samples that came too late, too early or twice
+
+    def warm_up(self) -> None:
+        """Compile the motion model; what is believed stays as it is."""
+        self._motion.warm_up()
 
     def update(self, sensed: Sensed) -> OdometryEstimate:
         """Fold in every sample at its own capture time, then carry the last twist on to the tick."""

@@ -34,6 +34,10 @@ class OdometryEstimate:
 class Odometry(Stateful, Protocol):
     """Turns what was sensed into motion since the start; odom is continuous and begins at the identity."""
 
+    def warm_up(self) -> None:
+        """Compile every kernel; called once before the first tick."""
+        ...
+
     def update(self, sensed: Sensed) -> OdometryEstimate:
         """Fold in all samples; bad ones are dropped and are a fault in the estimate, never an exception."""
         ...

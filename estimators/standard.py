@@ -67,6 +67,7 @@ class StandardEstimator:
 
     def warm_up(self) -> None:
         """Compile every kernel; what is believed stays as it is."""
+        self._odometry.warm_up()
         self._source.warm_up()
         spare = memory_of(self._settings.memory, self._settings.cell_m, self._setup.robot_radius_m)
         spare.merge(FrameLabels(spare.grid, spare.grid.label == FREE), 0, SE2())

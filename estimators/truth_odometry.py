@@ -21,6 +21,9 @@ class TruthOdometry:
         self._start_from_map = map_from_start.inverse()
         self._trail = PoseTrail(trail_s, extrapolation_max_s)
 
+    def warm_up(self) -> None:
+        """Do nothing: there is no kernel."""
+
     def update(self, sensed: Sensed) -> OdometryEstimate:
         """Take over the newest truth, carried on to the tick."""
         valid = sensed.truth is None or self._fold(sensed.truth, latest_valid_ns(sensed))

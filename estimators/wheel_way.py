@@ -63,7 +63,7 @@ class WheelModel:
         way_m, turned_rad = mean.speed_m_s * elapsed_s, mean.wz * elapsed_s
         twist = self.kinematics.twist(sample.velocity_rad_s)
         grip = self._grip(way_m, abs(turned_rad))
-        return WheelWay(motion, turned_rad, twist, grip + self._slip(way_m, abs(turned_rad)), grip)
+        return WheelWay(motion, turned_rad, twist, self._slipping(grip, way_m, abs(turned_rad)), grip)
 
     def standstill(self) -> WheelWay:
         """Return the way of a base that stands; it says more of the gyro's bias than wheels that are counted can."""
@@ -73,11 +73,18 @@ class WheelModel:
     def _grip(self, way_m: float, turned_rad: float) -> F64:
         """Counting, and a geometry that is not quite right."""
         s = self._settings
+        covariance: F64 = self._counting.copy()
         way, yaw = (s.way_scale_std * way_m) ** 2 + LEAST, (s.yaw_scale_std * turned_rad) ** 2 + LEAST
-        return np.asarray(self._counting + np.diag((way, way, yaw)))
+        covariance[0, 0] += way
+        covariance[1, 1] += way
+        covariance[2, 2] += yaw
+        return covariance
 
-    def _slip(self, way_m: float, turned_rad: float) -> F64:
-        s = self._settings
+    def _slipping(self, grip: F64, way_m: float, turned_rad: float) -> F64:
+        """And slip, which grows with the way and with the turn."""
+        s, covariance = self._settings, grip.copy()
         position = s.position_variance_m2_per_m * way_m + s.position_variance_m2_per_rad * turned_rad
-        yaw = s.yaw_variance_rad2_per_m * way_m + s.yaw_variance_rad2_per_rad * turned_rad
-        return np.diag((position, position, yaw))
+        covariance[0, 0] += position
+        covariance[1, 1] += position
+        covariance[2, 2] += s.yaw_variance_rad2_per_m * way_m + s.yaw_variance_rad2_per_rad * turned_rad
+        return covariance

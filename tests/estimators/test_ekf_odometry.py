@@ -318,7 +318,7 @@ finite = st.floats(-2.0, 2.0)
 
 @given(x=st.lists(finite, min_size=STATES, max_size=STATES), rate=finite, force=st.tuples(finite, finite))
 def test_the_jacobian_is_that_of_the_motion(x, rate, force):
-    inertial, dt_s, step = Inertial(rate, *force, 0.01, 0.1), 0.01, 1e-6
+    inertial, dt_s, step = Inertial(rate, *force, True, 0.01, 0.1), 0.01, 1e-6
     state = np.array(x)
     _, jacobian = moved(state, inertial, dt_s)
     for column in range(STATES):
@@ -329,8 +329,8 @@ def test_the_jacobian_is_that_of_the_motion(x, rate, force):
 
 @given(x=st.lists(finite, min_size=STATES, max_size=STATES), rate=finite)
 def test_process_noise_is_a_covariance(x, rate):
-    for force in (None, 0.3):
-        _, _, noise = transition(np.array(x), Inertial(rate, force, 0.1, 0.01, 0.1), np.array((1e-5, 1e-3, 1e-3)), 0.005)
+    for known in (True, False):
+        _, _, noise = transition(np.array(x), Inertial(rate, 0.3, 0.1, known, 0.01, 0.1), np.array((1e-5, 1e-3, 1e-3)), 0.005)
         assert np.array_equal(noise, noise.T)
         assert np.linalg.eigvalsh(noise).min() > -1e-15
 
