@@ -30,7 +30,8 @@ from drivers.interface.stateful import pack, unpack
 from estimators.belief import OCCUPIED, UNKNOWN, Lattice, Mask, OccupancyGrid
 from estimators.field_memory_kernels import fold_layers
 from estimators.labelling import FrameLabels
-from estimators.memory_kernels import free_disc
+from estimators.memory_kernels import free_disc, in_the_open
+from estimators.remembered import Remembered
 from estimators.rolling import cells_between, lattice_around, strays, transfer
 
 NEVER_NS = -(2**62)
@@ -84,10 +85,16 @@ class FieldMemory:
         return OccupancyGrid(self._window, frozen_array(transfer(self._label, self._cells, self._window, UNKNOWN)))
 
     @property
-    def moving(self) -> Mask:
-        """Which cells of `grid` are occupied where the static layer does not say so, shape (rows, columns)."""
-        unexplained = (self._static < self._settings.threshold).repeat(self._scale, axis=0).repeat(self._scale, axis=1)
-        return transfer(unexplained & (self._label == OCCUPIED), self._cells, self._window, False)
+    def remembered(self) -> Remembered:
+        """The grid and what else is known of its cells; what came is occupied where the static layer does not say so."""
+        came = self._fine(self._static < self._settings.threshold)
+        open_ground = self._fine(in_the_open(self._free_ns, NEVER_NS))
+        grid = self.grid
+        return Remembered(grid, np.asarray(came & (grid.label == OCCUPIED)), open_ground)
+
+    def _fine(self, layer: Mask) -> Mask:
+        """Return a layer's cells on the window."""
+        return transfer(layer.repeat(self._scale, axis=0).repeat(self._scale, axis=1), self._cells, self._window, False)
 
     @property
     def _cells(self) -> Lattice:

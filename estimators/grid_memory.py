@@ -17,9 +17,10 @@ from drivers.interface.geometry import SE2
 from drivers.interface.samples import frozen_array
 from drivers.interface.settings import Settings
 from drivers.interface.stateful import pack, unpack
-from estimators.belief import OCCUPIED, UNKNOWN, Lattice, Mask, OccupancyGrid
+from estimators.belief import OCCUPIED, UNKNOWN, Lattice, OccupancyGrid
 from estimators.labelling import FrameLabels
-from estimators.memory_kernels import fold, free_disc
+from estimators.memory_kernels import fold, free_disc, in_the_open
+from estimators.remembered import Remembered
 from estimators.rolling import lattice_around, strays, transfer
 
 NEVER_NS = -(2**62)
@@ -62,9 +63,10 @@ class GridMemory:
         return OccupancyGrid(self._lattice, frozen_array(self._label.copy()))
 
     @property
-    def moving(self) -> Mask:
-        """Which cells of `grid` are occupied by something that came there lately, shape (rows, columns)."""
-        return np.asarray(self._dynamic & (self._label == OCCUPIED))
+    def remembered(self) -> Remembered:
+        """The grid and what else is known of its cells."""
+        came = np.asarray(self._dynamic & (self._label == OCCUPIED))
+        return Remembered(self.grid, came, in_the_open(self._free_ns, NEVER_NS))
 
     def strays(self, odom_from_base: SE2) -> bool:
         """Tell whether the robot has come more than a quarter of the window away from the middle."""

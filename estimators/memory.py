@@ -9,10 +9,11 @@ from pydantic import Field
 from drivers.interface.geometry import SE2
 from drivers.interface.settings import Settings
 from drivers.interface.stateful import Stateful
-from estimators.belief import Mask, OccupancyGrid
+from estimators.belief import OccupancyGrid
 from estimators.field_memory import FieldMemory, FieldMemorySettings
 from estimators.grid_memory import GridMemory, GridMemorySettings
 from estimators.labelling import FrameLabels
+from estimators.remembered import Remembered
 
 
 class Memory(Stateful, Protocol):
@@ -24,8 +25,8 @@ class Memory(Stateful, Protocol):
         ...
 
     @property
-    def moving(self) -> Mask:
-        """Which cells of `grid` are occupied by something that came there lately, shape (rows, columns)."""
+    def remembered(self) -> Remembered:
+        """The grid and what else is known of its cells."""
         ...
 
     def strays(self, odom_from_base: SE2) -> bool:

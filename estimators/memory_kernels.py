@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import cv2
+import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
@@ -60,3 +62,12 @@ def free_disc(label: U8, x: float, y: float, radius: float) -> None:
         for column in range(max(0, math.floor(x - radius)), min(columns, math.ceil(x + radius))):
             if (column + 0.5 - x) ** 2 + (row + 0.5 - y) ** 2 <= radius**2:
                 label[row, column] = FREE
+
+
+def in_the_open(free_ns: I64, never_ns: int) -> Flags:
+    """Return which cells and all their neighbours have been seen free at some time, shape (rows, columns).
+
+    A ray that ends just before a wall at a shallow angle makes the wall's cell free, but never those behind it.
+    """
+    seen = (free_ns > never_ns).view(np.uint8)
+    return np.asarray(cv2.erode(seen, np.ones((3, 3), dtype=np.uint8)) != 0)

@@ -12,6 +12,7 @@ from drivers.interface.samples import JointSample
 from drivers.interface.sensed import Sensed
 from drivers.interface.settings import Settings
 from drivers.interface.stateful import pack, unpack
+from estimators import segmentation
 from estimators.belief import FREE, Belief, EstimatorFault, Track
 from estimators.clearance import ClearanceEstimator, ClearanceSettings
 from estimators.depth_grid import DepthGrid, DepthGridSettings
@@ -23,6 +24,7 @@ from estimators.memory import MemorySettings, memory_of
 from estimators.odometry import Odometry, OdometryEstimate, latest_valid_ns
 from estimators.odometry_choice import OdometrySettings, build_odometry
 from estimators.scan_grid import ScanGrid, ScanGridSettings
+from estimators.tracking import GridTracker, TrackingSettings
 from estimators.truth_odometry import TruthOdometry
 from estimators.truth_tracks import tracks_from_truth
 
@@ -31,7 +33,7 @@ class StandardSettings(Settings):
     """What each part of the standard estimator is set to."""
 
     pose: Literal["odometry", "truth"] = Field(default="odometry", description="where the pose comes from")
-    tracks: Literal["none", "truth"] = Field(default="none", description="where tracks of obstacles come from")
+    tracks: Literal["none", "truth", "grid"] = Field(default="none", description="where tracks of obstacles come from")
     source: Literal["depth", "scan"] = Field(default="depth", description="which sensor the grid is made from")
     cell_m: float = Field(default=0.05, ge=0.01, le=0.5, description="side of a cell of grid and clearance field")
     odometry: OdometrySettings = OdometrySettings()
@@ -39,6 +41,7 @@ class StandardSettings(Settings):
     scan: ScanGridSettings = ScanGridSettings()
     memory: MemorySettings = MemorySettings()
     clearance: ClearanceSettings = ClearanceSettings()
+    tracking: TrackingSettings = TrackingSettings()
 
 
 class StandardEstimator:
@@ -61,6 +64,7 @@ class StandardEstimator:
         self._filter = GridFilter(settings.depth.filter, settings.cell_m) if filtered else None
         self._memory = memory_of(settings.memory, settings.cell_m, setup.robot_radius_m)
         self._clearance = ClearanceEstimator(settings.clearance)
+        self._tracker = GridTracker(settings.tracking) if settings.tracks == "grid" else None
         self._grid = self._memory.grid
         self._frame_ns: int | None = None  # capture time of the newest frame used
         self._joints: JointSample | None = None
@@ -69,6 +73,7 @@ class StandardEstimator:
         """Compile every kernel; what is believed stays as it is."""
         self._odometry.warm_up()
         self._source.warm_up()
+        segmentation.warm_up()
         spare = memory_of(self._settings.memory, self._settings.cell_m, self._setup.robot_radius_m)
         spare.merge(FrameLabels(spare.grid, spare.grid.label == FREE), 0, SE2())
 
@@ -100,6 +105,8 @@ class StandardEstimator:
         self._memory.merge(frame, captured_ns, pose)
         self._frame_ns = captured_ns
         self._refresh(captured_ns)
+        if self._tracker is not None:
+            self._tracker.update(frame, self._memory.remembered, captured_ns)
         return True
 
     def _refresh(self, stamp_ns: int) -> None:
@@ -128,6 +135,8 @@ class StandardEstimator:
         )
 
     def _tracks(self, sensed: Sensed) -> tuple[Track, ...]:
+        if self._tracker is not None:
+            return self._tracker.tracks_at(sensed.tick.start_ns)
         if self._settings.tracks == "none" or sensed.truth is None:
             return ()
         return tracks_from_truth(sensed.truth, self._setup.map_from_start.inverse())
@@ -139,6 +148,7 @@ class StandardEstimator:
             filter=np.frombuffer(b"" if self._filter is None else self._filter.snapshot(), dtype=np.uint8),
             memory=np.frombuffer(self._memory.snapshot(), dtype=np.uint8),
             clearance=np.frombuffer(self._clearance.snapshot(), dtype=np.uint8),
+            tracker=np.frombuffer(b"" if self._tracker is None else self._tracker.snapshot(), dtype=np.uint8),
             frame_ns=np.array([] if self._frame_ns is None else [self._frame_ns], dtype=np.int64),
             joints=pack_joints(self._joints),
         )
@@ -151,6 +161,8 @@ class StandardEstimator:
             self._filter.restore(state["filter"].tobytes())
         self._memory.restore(state["memory"].tobytes())
         self._clearance.restore(state["clearance"].tobytes())
+        if self._tracker is not None:
+            self._tracker.restore(state["tracker"].tobytes())
         self._grid = self._memory.grid
         self._frame_ns = int(state["frame_ns"][0]) if state["frame_ns"].size else None
         self._joints = unpack_joints(state["joints"])

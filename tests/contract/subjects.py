@@ -21,7 +21,7 @@ VARIANTS: dict[str, tuple[dict[str, Any], ...]] = {
         {"source": "scan", "odometry": {"use_gyro": True}},
         {"source": "scan", "odometry": {"kind": "ekf"}},
         {"pose": "truth", "tracks": "truth"},
-        {"memory": {"kind": "layers"}, "depth": {"filtered": True}},
+        {"memory": {"kind": "layers"}, "depth": {"filtered": True}, "tracks": "grid"},
     ),
 }
 NAN, INF = math.nan, math.inf

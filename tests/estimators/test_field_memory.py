@@ -9,6 +9,7 @@ from drivers.interface.seeds import stream
 from estimators.belief import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from estimators.clearance import ClearanceEstimator, ClearanceSettings
 from estimators.field_memory import FieldMemory, FieldMemorySettings
+from estimators.grid_memory import GridMemory, GridMemorySettings
 from estimators.labelling import FrameLabels
 from estimators.rolling import lattice_around
 from tests.estimators.scenes import MS, ORIGIN
@@ -20,6 +21,10 @@ PLACE = (0.52, 0.02)
 
 def memory(**settings):
     return FieldMemory(FieldMemorySettings(**{"extent_m": 5.0, **settings}), WINDOW_M, CELL_M, RADIUS_M)
+
+
+def rolling():
+    return GridMemory(GridMemorySettings(), WINDOW_M, CELL_M, RADIUS_M)
 
 
 def frame_of(cells, blind=(), x=0.0, y=0.0, side=61):
@@ -82,8 +87,7 @@ def test_what_stays_where_it_came_grows_static(period_ns):
     grid.merge(frame_of(around(FREE)), 0, ORIGIN)
     for now in range(period_ns, 6 * SECOND, period_ns):
         grid.merge(frame_of({PLACE: OCCUPIED}), now, ORIGIN)
-        settled = not grid.moving.any()
-        assert settled == (now > 1.5 * SECOND) or abs(now - 1.5 * SECOND) < 0.3 * SECOND
+        assert grid.remembered.came.any() == (now < 1.5 * SECOND) or abs(now - 1.5 * SECOND) < 0.3 * SECOND
     assert last_occupied_s(grid, now, SECOND, 60.0) > 30.0
 
 
@@ -119,13 +123,17 @@ def test_in_the_blind_zone_a_wall_persists_until_every_column_sees_past_it():
     assert at(grid, *PLACE) == FREE
 
 
-def test_moving_is_what_came_where_it_was_free():
-    grid, wall = memory(), (0.92, 0.02)
-    grid.merge(frame_of(around(FREE)), 0, ORIGIN)
+@pytest.mark.parametrize("build", [memory, rolling])
+def test_what_came_is_told_from_what_stood_there_and_open_ground_from_the_edge_of_what_is_known(build):
+    grid, wall = build(), (0.92, 0.02)
+    ground = {(x, y): FREE for x in np.arange(0.325, 0.75, CELL_M) for y in np.arange(-0.275, 0.35, CELL_M)}
+    grid.merge(frame_of(ground), 0, ORIGIN)
     grid.merge(frame_of({PLACE: OCCUPIED, wall: OCCUPIED}), SECOND, ORIGIN)
-    lattice, moving = grid.grid.lattice, grid.moving
-    assert moving.sum() == 1
-    assert moving[lattice.cell_of(np.array([PLACE]))].all()
+    known = grid.remembered
+    here, there, edge = (known.grid.lattice.cell_of(np.array([place])) for place in (PLACE, wall, (0.725, 0.02)))
+    assert known.came.sum() == 1
+    assert (known.came[here][0], known.came[there][0]) == (True, False)
+    assert (known.open[here][0], known.open[there][0], known.open[edge][0]) == (True, False, False)
 
 
 def test_back_in_the_window_what_left_it_is_remembered_as_far_as_the_layers_reach():

@@ -1,0 +1,52 @@
+"""The motion model of a track: constant velocity, driven by white acceleration; the algebra is FilterPy's.
+
+Source: Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation, section 6.3.2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from filterpy.common import Q_discrete_white_noise
+from filterpy.kalman import predict, update
+
+from estimators.belief import F64
+
+POSITION = np.eye(2, 4)  # what of the state is measured
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Position and velocity in odom, with covariance."""
+
+    state: F64  # (4,): x, y [m], vx, vy [m/s]
+    covariance: F64  # (4, 4)
+
+
+class ConstantVelocity:
+    """Carries motions over one stretch of time."""
+
+    def __init__(self, elapsed_s: float, acceleration_m_s2: float) -> None:
+        """`acceleration_m_s2` is the standard deviation of what changes the velocity."""
+        self._transition = np.eye(4) + elapsed_s * np.eye(4, k=2)
+        noise = Q_discrete_white_noise(dim=2, dt=elapsed_s, var=acceleration_m_s2**2, block_size=2, order_by_dim=False)
+        self._noise: F64 = np.asarray(noise)
+
+    def carry(self, motion: Motion) -> Motion:
+        """Return the motion after the time."""
+        state, covariance = predict(motion.state, motion.covariance, self._transition, self._noise)
+        return Motion(state, covariance)
+
+
+def corrected(motion: Motion, position_m: F64, sigma_m: float) -> Motion:
+    """Return the motion after a position, shape (2,), was measured with a standard deviation per axis."""
+    state, covariance = update(motion.state, motion.covariance, position_m, sigma_m**2 * np.eye(2), POSITION)
+    return Motion(state, 0.5 * (covariance + covariance.T))
+
+
+def squared_distances(motion: Motion, positions_m: F64, sigmas_m: F64) -> F64:
+    """Return the squared Mahalanobis distances, shape (n,), of measured positions, shape (n, 2), with sigmas, shape (n,)."""
+    offset = positions_m - motion.state[:2]
+    spread = motion.covariance[:2, :2] + sigmas_m[:, None, None] ** 2 * np.eye(2)  # (n, 2, 2)
+    return np.asarray(np.einsum("ni,nij,nj->n", offset, np.linalg.inv(spread), offset))

@@ -1,0 +1,129 @@
+"""What moves, as discs: the cells a frame saw occupied that the static world does not explain, in connected components."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.belief import F64, OCCUPIED, U8, Lattice, Mask
+from estimators.labelling import FrameLabels
+from estimators.remembered import Remembered
+from estimators.rolling import transfer
+from estimators.tracking_kernels import apparent_disc, centre_of
+
+NEIGHBOURS = np.ones((3, 3), dtype=np.uint8)
+
+
+@dataclass(frozen=True, slots=True)
+class Disc:
+    """A round thing somewhere in odom."""
+
+    x_m: float
+    y_m: float
+    radius_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """The seen surface of something that moves."""
+
+    points: F64  # (n, 2), centres of its cells in odom
+    disc: Disc  # what it looks like, by its width
+    loose: bool  # whether most of it stands on open ground, apart from all that is static
+
+
+def warm_up() -> None:
+    """Compile every kernel."""
+    apparent_disc(np.ones((1, 2)), 0.0, 0.0)
+    centre_of(np.ones((1, 2)), 0.0, 0.0, 1.0)
+
+
+def sensor_of(lattice: Lattice) -> tuple[float, float]:
+    """Return where in odom [m] the sensor stood whose frame a lattice holds: in the middle, to half a cell."""
+    return lattice.x_m + 0.5 * lattice.columns * lattice.cell_m, lattice.y_m + 0.5 * lattice.rows * lattice.cell_m
+
+
+@dataclass(frozen=True, slots=True)
+class Surfaces:
+    """Which cells of a frame are occupied by what is not static."""
+
+    lattice: Lattice
+    unexplained: Mask  # (rows, columns)
+    loose: Mask  # (rows, columns); on open ground, and nothing static hangs together with it
+
+
+def surfaces_of(frame: FrameLabels, remembered: Remembered) -> Surfaces:
+    """Tell static and other surfaces of a frame apart by what the memory knows.
+
+    A static surface may fall into the next cell as the robot moves, so what touches one is explained by it.  Where a wall
+    comes into range, rays that end just before it make its cells free first, and so its end seems to have come there lately;
+    but it hangs together with the rest of it, and what lies behind was never seen free.
+    """
+    lattice, seen = frame.grid.lattice, frame.grid.label == OCCUPIED
+    static = transfer((remembered.grid.label == OCCUPIED) & ~remembered.came, remembered.grid.lattice, lattice, False)
+    explained = cv2.dilate(static.view(np.uint8), NEIGHBOURS) != 0
+    _, component = cv2.connectedComponents(_joined(seen), connectivity=8)
+    holds_static = np.zeros(component.max() + 1, dtype=np.bool_)
+    holds_static[component[seen & explained]] = True
+    open_ground = transfer(remembered.open, remembered.grid.lattice, lattice, False)
+    return Surfaces(lattice, np.asarray(seen & ~explained), np.asarray(open_ground & ~holds_static[component]))
+
+
+def _joined(cells: Mask) -> U8:
+    """Return the cells, shape (rows, columns), with gaps of two cells closed."""
+    return np.asarray(cv2.dilate(cells.view(np.uint8), NEIGHBOURS), dtype=np.uint8)
+
+
+def segments(surfaces: Surfaces, expected: list[Disc], cells_min: int, radius_max_m: float) -> list[Segment]:
+    """Return the components of what is unexplained, in no order of meaning; one over two expected discs is cut between them."""
+    lattice = surfaces.lattice
+    _, component = cv2.connectedComponents(_joined(surfaces.unexplained), connectivity=8)
+    rows, columns = np.nonzero(surfaces.unexplained)
+    points, part, loose = lattice.centres(rows, columns), component[rows, columns], surfaces.loose[rows, columns]
+    if len(expected) > 1 and len(points):
+        part = _cut(points, part, expected)
+    x, y = sensor_of(lattice)
+    found = []
+    for one in np.unique(part):
+        surface = np.ascontiguousarray(points[part == one])
+        if len(surface) >= cells_min:
+            bearing, nearest, radius = apparent_disc(surface, x, y)
+            if radius <= radius_max_m:
+                far = nearest + radius
+                disc = Disc(x + far * math.cos(bearing), y + far * math.sin(bearing), radius)
+                found.append(Segment(surface, disc, bool(loose[part == one].mean() > 0.5)))
+    return found
+
+
+def _cut(points: F64, part: NDArray[Any], expected: list[Disc]) -> NDArray[Any]:
+    """Return the parts of points, shape (n,), with those cut that reach over more than one expected disc.
+
+    Each point of such a part goes to the disc whose edge is nearest, among those that have points of it.
+    """
+    centres = np.array([(disc.x_m, disc.y_m) for disc in expected])
+    radii = np.array([disc.radius_m for disc in expected])
+    beyond = np.linalg.norm(points[:, None] - centres, axis=2) - radii  # (n, discs), from the edge [m]
+    owner = beyond.argmin(axis=1)
+    claimed = beyond.min(axis=1) < 0.5 * radii[owner]
+    cut = part.copy()
+    for one in np.unique(part):
+        inside = part == one
+        owners = np.unique(owner[inside & claimed])
+        if len(owners) > 1:
+            nearest = owners[beyond[inside][:, owners].argmin(axis=1)]
+            cut[inside] = part.max() + 1 + one * len(expected) + nearest
+    return cut
+
+
+def centred(segment: Segment, radius_m: float, lattice: Lattice) -> F64:
+    """Return the centre in odom, shape (2,), of the disc of known radius that shows this surface to the sensor."""
+    x, y = sensor_of(lattice)
+    far = math.hypot(segment.disc.x_m - x, segment.disc.y_m - y)
+    share = 1.0 + (radius_m - segment.disc.radius_m) / far
+    guess = x + share * (segment.disc.x_m - x), y + share * (segment.disc.y_m - y)
+    return np.array(centre_of(segment.points, *guess, radius_m))

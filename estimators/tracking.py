@@ -1,0 +1,176 @@
+"""Moving obstacles without classes: discs that no static wall explains, followed from frame to frame in odom.
+
+Components of cells become discs (`estimators.segmentation`), discs are given to tracks by the assignment of least total
+distance, tracks move at constant velocity (`estimators.constant_velocity`).  A track is given out once it was seen often
+enough.  Out of sight it coasts; where its place is seen to be free it soon ends.  What stands still long enough to count as
+static is the grid's business and no longer a track's.
+
+Source of the scheme: Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation, chapters 1 and 6.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pydantic import Field
+from scipy.optimize import linear_sum_assignment
+
+from drivers.interface.samples import frozen_array
+from drivers.interface.settings import Settings
+from drivers.interface.stateful import pack, unpack
+from estimators.belief import F64, FREE, Lattice, OccupancyGrid, Track
+from estimators.constant_velocity import ConstantVelocity, Motion, corrected, squared_distances
+from estimators.labelling import FrameLabels
+from estimators.remembered import Remembered
+from estimators.segmentation import Disc, Segment, centred, segments, surfaces_of
+
+SECOND_NS = 1_000_000_000
+BEYOND = 1e6  # the cost of what is outside the gate
+
+
+class TrackingSettings(Settings):
+    """How obstacles are found, followed, and given up."""
+
+    cells_min: int = Field(default=3, ge=1, le=100, description="smaller components are noise")
+    radius_max_m: float = Field(default=0.6, gt=0.0, le=3.0, description="what looks wider is no obstacle that moves")
+    radius_min_m: float = Field(default=0.05, gt=0.0, le=1.0, description="no track is thinner")
+    sigma_m: float = Field(default=0.04, gt=0.0, le=1.0, description="of a measured centre, each axis")
+    speed_sigma_m_s: float = Field(default=0.8, gt=0.0, le=5.0, description="of a new track's velocity, each axis")
+    acceleration_m_s2: float = Field(default=3.0, gt=0.0, le=20.0, description="standard deviation of what changes a velocity")
+    gate: float = Field(default=13.8, gt=0.0, le=100.0, description="largest squared distance; 13.8: 99.9 % of two axes")
+    hits_min: int = Field(default=3, ge=1, le=100, description="frames in which a track was seen before it is given out")
+    vanish_s: float = Field(default=0.25, ge=0.0, le=10.0, description="how long it lives where its place is seen free")
+    coast_s: float = Field(default=1.5, ge=0.0, le=30.0, description="how long it lives out of sight")
+    radius_gain: float = Field(
+        default=0.3, gt=0.0, le=1.0, description="weight of a wider look, per frame; of a narrower a tenth"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """A track as it is kept between frames."""
+
+    identity: int
+    motion: Motion
+    radius_m: float
+    hits: int
+    seen_ns: int
+
+    @property
+    def disc(self) -> Disc:
+        """Where it is."""
+        return Disc(float(self.motion.state[0]), float(self.motion.state[1]), self.radius_m)
+
+
+class GridTracker:
+    """Follows what moves through the frames."""
+
+    def __init__(self, settings: TrackingSettings) -> None:
+        """Start without tracks."""
+        self._settings = settings
+        self._tracks: list[Followed] = []  # by identity
+        self._next_identity = 0
+        self._stamp_ns = 0
+
+    def update(self, frame: FrameLabels, remembered: Remembered, stamp_ns: int) -> None:
+        """Take in a frame captured at `stamp_ns`, and what the memory knows with it."""
+        settings, lattice = self._settings, frame.grid.lattice
+        carry = ConstantVelocity((stamp_ns - self._stamp_ns) / SECOND_NS, settings.acceleration_m_s2)
+        self._stamp_ns = stamp_ns
+        tracks = [replace(one, motion=carry.carry(one.motion)) for one in self._tracks if self._recent(one, stamp_ns)]
+        surfaces = surfaces_of(frame, remembered)
+        found = segments(surfaces, [track.disc for track in tracks], settings.cells_min, settings.radius_max_m)
+        pairs = self._assign(tracks, found, lattice)
+        tracks = [self._seen(track, found[pairs[i]], lattice) if i in pairs else track for i, track in enumerate(tracks)]
+        taken = set(pairs.values())
+        born = [segment for index, segment in enumerate(found) if index not in taken and segment.loose]
+        self._tracks = [track for track in tracks if self._lives(track, frame.grid)]
+        for segment in born:
+            self._give_birth(segment, lattice)
+
+    def _assign(self, tracks: list[Followed], found: list[Segment], lattice: Lattice) -> dict[int, int]:
+        """Return which segment each track gets, by their places in the lists."""
+        if not (tracks and found):
+            return {}
+        cost = np.array([self._distances(track, found, lattice) for track in tracks])
+        cost = np.where(cost <= self._settings.gate, cost, BEYOND)
+        return {int(t): int(s) for t, s in zip(*linear_sum_assignment(cost), strict=True) if cost[t, s] < BEYOND}
+
+    def _distances(self, track: Followed, found: list[Segment], lattice: Lattice) -> F64:
+        """Return the squared distances, shape (segments,), of a track."""
+        centres = np.array([centred(segment, track.radius_m, lattice) for segment in found])
+        sigmas_m = np.array([self._sigma_m(track, segment) for segment in found])
+        return squared_distances(track.motion, centres, sigmas_m)
+
+    def _sigma_m(self, track: Followed, segment: Segment) -> float:
+        """Return how far off a centre may be: what looks narrower than it is, is hidden in part, and who knows which."""
+        return self._settings.sigma_m + max(0.0, 0.8 * track.radius_m - segment.disc.radius_m)
+
+    def _seen(self, track: Followed, segment: Segment, lattice: Lattice) -> Followed:
+        settings, wider_m = self._settings, segment.disc.radius_m - track.radius_m
+        gain = settings.radius_gain if wider_m > 0.0 else 0.1 * settings.radius_gain
+        radius_m = max(track.radius_m + gain * wider_m, settings.radius_min_m)
+        motion = corrected(track.motion, centred(segment, radius_m, lattice), self._sigma_m(track, segment))
+        return Followed(track.identity, motion, radius_m, track.hits + 1, self._stamp_ns)
+
+    def _lives(self, track: Followed, seen: OccupancyGrid) -> bool:
+        row, column = (int(index[0]) for index in seen.lattice.cell_of(track.motion.state[None, :2]))
+        inside = 0 <= row < seen.lattice.rows and 0 <= column < seen.lattice.columns
+        gone = (inside and seen.label[row, column] == FREE) or track.hits < self._settings.hits_min
+        return not gone or self._stamp_ns - track.seen_ns <= self._settings.vanish_s * SECOND_NS
+
+    def _give_birth(self, segment: Segment, lattice: Lattice) -> None:
+        """Begin a track, unless the segment is a piece of one that is there."""
+        radius_m = max(segment.disc.radius_m, self._settings.radius_min_m)
+        x, y = centred(segment, radius_m, lattice)
+        if any((x - one.disc.x_m) ** 2 + (y - one.disc.y_m) ** 2 < one.radius_m**2 for one in self._tracks):
+            return
+        variance = np.repeat((self._settings.sigma_m**2, self._settings.speed_sigma_m_s**2), 2)
+        motion = Motion(np.array([x, y, 0.0, 0.0]), np.diag(variance))
+        self._tracks.append(Followed(self._next_identity, motion, radius_m, 1, self._stamp_ns))
+        self._next_identity += 1
+
+    def tracks_at(self, time_ns: int) -> tuple[Track, ...]:
+        """Return the tracks that were seen often enough and not too long ago, carried on to a time, by identity."""
+        settings = self._settings
+        carry = ConstantVelocity(max(time_ns - self._stamp_ns, 0) / SECOND_NS, settings.acceleration_m_s2)
+        return tuple(
+            _track(one, carry.carry(one.motion))
+            for one in self._tracks
+            if one.hits >= settings.hits_min and self._recent(one, time_ns)
+        )
+
+    def _recent(self, track: Followed, time_ns: int) -> bool:
+        return time_ns - track.seen_ns <= self._settings.coast_s * SECOND_NS
+
+    def snapshot(self) -> bytes:
+        """Return the whole state."""
+        tracks = self._tracks
+        return pack(
+            identity=np.array([track.identity for track in tracks], dtype=np.int64),
+            state=np.array([track.motion.state for track in tracks]).reshape(-1, 4),
+            covariance=np.array([track.motion.covariance for track in tracks]).reshape(-1, 4, 4),
+            radius_m=np.array([track.radius_m for track in tracks], dtype=np.float64),
+            hits=np.array([track.hits for track in tracks], dtype=np.int64),
+            seen_ns=np.array([track.seen_ns for track in tracks], dtype=np.int64),
+            next_identity=self._next_identity,
+            stamp_ns=self._stamp_ns,
+        )
+
+    def restore(self, snapshot: bytes) -> None:
+        """Take over a state."""
+        state = unpack(snapshot)
+        motions = [Motion(*both) for both in zip(state["state"], state["covariance"], strict=True)]
+        numbers = (state[name].tolist() for name in ("identity", "radius_m", "hits", "seen_ns"))
+        self._tracks = [
+            Followed(identity, motion, radius_m, hits, seen_ns)
+            for motion, identity, radius_m, hits, seen_ns in zip(motions, *numbers, strict=True)
+        ]
+        self._next_identity, self._stamp_ns = int(state["next_identity"]), int(state["stamp_ns"])
+
+
+def _track(one: Followed, now: Motion) -> Track:
+    x, y, vx, vy = now.state.tolist()
+    covariance: F64 = frozen_array(0.5 * (now.covariance + now.covariance.T))
+    return Track(one.identity, (x, y), (vx, vy), one.radius_m, covariance)
