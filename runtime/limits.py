@@ -19,6 +19,10 @@ class _Axis:
     jerk: float
     stop: float
 
+    def holds(self, v: float) -> bool:
+        """Whether a velocity is inside the caps, to rounding."""
+        return self.lowest - 1e-9 <= v <= self.highest + 1e-9
+
 
 @dataclass(frozen=True, slots=True)
 class Motion:
@@ -38,12 +42,11 @@ class Limiter:
 
     def reachable(self, motion: Motion, speed_factor: float = 1.0) -> ReachableSet:
         """Return the box of twists that can be sent one period after `motion`; caps are times `speed_factor`."""
-        velocities, accelerations = _values(motion.twist), _values(motion.acceleration)
-        x, y, w = (
-            _interval(v, a, axis, speed_factor, self._dt)
-            for v, a, axis in zip(velocities, accelerations, self._axes, strict=True)
-        )
-        return ReachableSet(BodyTwist(x[0], y[0], w[0]), BodyTwist(x[1], y[1], w[1]))
+        v, a, (x, y, w) = motion.twist, motion.acceleration, self._axes
+        x_low, x_high = _interval(v.vx, a.vx, x, speed_factor, self._dt)
+        y_low, y_high = _interval(v.vy, a.vy, y, speed_factor, self._dt)
+        w_low, w_high = _interval(v.wz, a.wz, w, speed_factor, self._dt)
+        return ReachableSet(BodyTwist(x_low, y_low, w_low), BodyTwist(x_high, y_high, w_high))
 
     def stopping(self, motion: Motion) -> BodyTwist:
         """Return the next twist of a stop: each axis towards zero with the stop's own deceleration, jerk aside."""
@@ -55,9 +58,8 @@ class Limiter:
 
     def within_caps(self, twist: BodyTwist) -> bool:
         """Whether the twist is inside the velocity caps (to rounding)."""
-        eps = 1e-9
-        inside = (a.lowest - eps <= v <= a.highest + eps for v, a in zip(_values(twist), self._axes, strict=True))
-        return all(inside)
+        x, y, w = self._axes
+        return x.holds(twist.vx) and y.holds(twist.vy) and w.holds(twist.wz)
 
     def after(self, motion: Motion, sent: BodyTwist) -> Motion:
         """Return the motion after `sent` was sent."""
@@ -90,8 +92,8 @@ def _interval(v: float, a: float, axis: _Axis, factor: float, dt: float) -> tupl
         return 0.0, 0.0
     a = min(max(a, -axis.acceleration), axis.acceleration)  # a stop may have braked harder than this
     soonest, latest = max(-axis.acceleration, a - axis.jerk * dt), min(axis.acceleration, a + axis.jerk * dt)
-    ends = (-_room(v - factor * axis.lowest, axis.jerk, dt), _room(factor * axis.highest - v, axis.jerk, dt))
-    low, high = (min(max(end, soonest), latest) for end in ends)
+    low = min(max(-_room(v - factor * axis.lowest, axis.jerk, dt), soonest), latest)
+    high = min(max(_room(factor * axis.highest - v, axis.jerk, dt), soonest), latest)
     return v + min(low, high) * dt, v + max(low, high) * dt
 
 

@@ -59,6 +59,8 @@ class Robot:
         """Take the devices, still closed."""
         self.devices = devices
         self._mission = mission
+        self._named = tuple(devices)
+        self._broken = {name: DeviceHealth(name, DeviceState.FAULTED) for name, _ in devices}
         self._failures: dict[str, str] = {}  # what each device has raised since the last tick
 
     def open(self) -> None:
@@ -91,7 +93,7 @@ class Robot:
             scans=self._ask("scan", d.scan.drain, ()) if d.scan else (),
             operator=events,
             truth=self._ask("truth", d.truth.latest, None) if d.truth else None,
-            health=tuple(self._health(name, device) for name, device in d),
+            health=tuple(self._health(name, device) for name, device in self._named),
             mission=self._mission.fold(events),
         )
 
@@ -119,7 +121,7 @@ class Robot:
             return otherwise
 
     def _health(self, name: str, device: Device) -> DeviceHealth:
-        health = self._ask(name, device.health, DeviceHealth(name, DeviceState.FAULTED))
+        health = self._ask(name, device.health, self._broken[name])
         failure = self._failures.pop(name, "")
         return replace(health, state=DeviceState.FAULTED, fault=failure) if failure else health
 

@@ -69,8 +69,7 @@ class FieldCbf:
     def __init__(self, settings: Settings, setup: ShieldSetup) -> None:
         """Take the settings."""
         s = settings
-        braking_s = s.braking_allowance * _braking_time_s(setup.limits)
-        braking_m = 0.0 if setup.limits is None else braking_s * setup.limits.velocity.vx
+        braking_s, braking_m = (s.braking_allowance * amount for amount in _braking(setup.limits))
         self._stop_when_infeasible = s.on_infeasible == "stop"
         self._barrier = Barrier(
             safe_m=setup.robot_radius_m + s.d_min_m,
@@ -126,6 +125,9 @@ class FieldCbf:
         return vx, vy, FieldCbfDiagnostics(samples, active, least_h_m, infeasible, slack, enclosed)
 
 
-def _braking_time_s(limits: BaseLimits | None) -> float:
-    """Return how long the base takes to stop from full speed within its normal acceleration [s]."""
-    return 0.0 if limits is None else limits.velocity.vx / limits.acceleration.vx
+def _braking(limits: BaseLimits | None) -> tuple[float, float]:
+    """Return how long [s] and how far [m] the base goes on from full speed within its normal acceleration."""
+    if limits is None:
+        return 0.0, 0.0
+    time_s = limits.velocity.vx / limits.acceleration.vx
+    return time_s, 0.5 * limits.velocity.vx * time_s
