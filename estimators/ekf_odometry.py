@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from drivers.interface.commands import BodyTwist
 from drivers.interface.geometry import SE2
 from drivers.interface.kinematics import WheelKinematics
-from drivers.interface.samples import frozen_array
+from drivers.interface.samples import BaseSample, PoseSample, frozen_array
 from drivers.interface.sensed import Sensed
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import EstimatorFault
@@ -42,6 +44,7 @@ class EkfOdometry:
         self._late_max_ns = round(settings.late_max_s * SECOND_NS)
         span_s = max(trail_s, settings.late_max_s)
         self._history = History(self._motion, round(span_s * SECOND_NS))
+        self._wheels_late_ns = round(limits.wheels_late_s * SECOND_NS)
         self._trail = PoseTrail(span_s, extrapolation_max_s)
         self._refused = 0  # samples that came too late, too early or twice
 
@@ -52,7 +55,7 @@ class EkfOdometry:
     def update(self, sensed: Sensed) -> OdometryEstimate:
         """Fold in every sample at its own capture time, then carry the last twist on to the tick."""
         before, refused_before = self._history.newest, self._refused
-        samples: tuple[Sample, ...] = (*sensed.imu, *sensed.base)
+        samples: tuple[Sample, ...] = (*sensed.imu, *(self._on_time(sample) for sample in sensed.base))
         earliest_ns, latest_ns = sensed.tick.start_ns - self._late_max_ns, latest_valid_ns(sensed)
         timely = [sample for sample in samples if earliest_ns <= sample.stamp.captured_ns <= latest_ns]
         first, repeated = self._history.insert(timely)
@@ -66,6 +69,13 @@ class EkfOdometry:
     def pose_at(self, time_ns: int) -> SE2:
         """Return odom_from_base at a time of the recent past."""
         return self._trail.at(time_ns)
+
+    def _on_time(self, sample: BaseSample) -> BaseSample:
+        """Return a wheel sample with the stamp that it should have borne, as calibration found out."""
+        if self._wheels_late_ns == 0 or isinstance(sample, PoseSample):
+            return sample
+        stamp = replace(sample.stamp, captured_ns=sample.stamp.captured_ns - self._wheels_late_ns)
+        return replace(sample, stamp=stamp)
 
     def _estimate(self, start_ns: int, state: EkfState, faults: tuple[EstimatorFault, ...]) -> OdometryEstimate:
         covariance = frozen_array(state.covariance[POSE, POSE].copy())

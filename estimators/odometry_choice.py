@@ -24,6 +24,7 @@ class OdometrySettings(DeadReckoningSettings):
     geometry: Geometry | None = Field(default=None, description="as calibrated; none: the base's own")
     gyro_bias_rad_s: float = Field(default=0.0, ge=-1.0, le=1.0, description="as calibrated: true rate = scale * gyro - bias")
     gyro_scale: float = Field(default=1.0, ge=0.5, le=2.0, description="as calibrated")
+    wheels_late_s: float = Field(default=0.0, ge=-0.1, le=0.1, description="as calibrated: of their stamps, against the gyro's")
     ekf: EkfSettings = EkfSettings()
 
 
@@ -33,6 +34,12 @@ def build_odometry(settings: OdometrySettings, kinematics: WheelKinematics | Non
         kinematics = settings.geometry.kinematics
     if settings.kind == "dead_reckoning":
         return DeadReckoning(settings, kinematics)
-    limits = MotionLimits(settings.speed_max_m_s, settings.turn_rate_max_rad_s, settings.gyro_bias_rad_s, settings.gyro_scale)
+    limits = MotionLimits(
+        settings.speed_max_m_s,
+        settings.turn_rate_max_rad_s,
+        settings.gyro_bias_rad_s,
+        settings.gyro_scale,
+        settings.wheels_late_s,
+    )
     trail_s, beyond_s = settings.trail_s, settings.extrapolation_max_s
     return EkfOdometry(settings.ekf, limits, kinematics, trail_s=trail_s, extrapolation_max_s=beyond_s)

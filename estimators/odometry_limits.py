@@ -11,3 +11,4 @@ class MotionLimits:
     turn_rate_max_rad_s: float
     gyro_bias_rad_s: float = 0.0
     gyro_scale: float = 1.0  # true rate = scale times what the gyro says, less the bias
+    wheels_late_s: float = 0.0  # how much later than the gyro's the wheels' stamps are

@@ -1,0 +1,78 @@
+"""The calibration of a base: wheels and gyro together, with the odometry's error before and after."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.interface.kinematics import WheelKinematics
+from estimators.belief import F64
+from estimators.calibration.drive import LEAST_SAMPLES, Drive, ways
+from estimators.calibration.gyro import GyroCalibration, calibrate_gyro
+from estimators.calibration.identify import Identified
+from estimators.calibration.wheels import WheelCalibration, calibrate_wheels, wheel_ways
+
+
+@dataclass(frozen=True, slots=True)
+class DriftError:
+    """How far the wheels' own reckoning strays from the references."""
+
+    way_rms_m: float  # of the ways from one reference to the next
+    turn_rms_rad: float
+    end_m: float  # at the end of the drive
+    end_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class BaseCalibration:
+    """What a drive has told; `gyro` is None on a robot that has none."""
+
+    wheels: WheelCalibration
+    gyro: GyroCalibration | None
+    before: DriftError
+    after: DriftError
+
+    @property
+    def found(self) -> tuple[Identified, ...]:
+        """Every parameter, wheels first."""
+        return self.wheels.found + (() if self.gyro is None else self.gyro.found)
+
+    @property
+    def wheels_late_s(self) -> float:
+        """How much later than the gyro's the wheels' stamps are."""
+        return 0.0 if self.gyro is None else self.wheels.late_s - self.gyro.late_s
+
+
+def calibrate_base(drive: Drive, nominal: WheelKinematics) -> BaseCalibration:
+    """Identify everything that the drive determines.
+
+    Raises:
+        ConfigurationError: it does not determine a parameter; the sentence names it.
+    """
+    wheels = calibrate_wheels(drive, nominal)
+    gyro = calibrate_gyro(drive) if len(drive.gyro_s) >= LEAST_SAMPLES else None
+    calibrated = wheels.geometry.kinematics
+    return BaseCalibration(wheels, gyro, drift_error(drive, nominal), drift_error(drive, calibrated, wheels.late_s))
+
+
+def drift_error(drive: Drive, kinematics: WheelKinematics, late_s: float = 0.0) -> DriftError:
+    """Return the error of dead reckoning by a geometry, against the references."""
+    made, true = wheel_ways(drive, kinematics, late_s), ways(drive.references)
+    wrong = made - true
+    end = _chained(made) - _chained(true)
+    return DriftError(
+        way_rms_m=float(np.sqrt(np.mean(np.sum(wrong[:, :2] ** 2, axis=1)))),
+        turn_rms_rad=float(np.sqrt(np.mean(wrong[:, 2] ** 2))),
+        end_m=math.hypot(float(end[0]), float(end[1])),
+        end_rad=abs(float(end[2])),
+    )
+
+
+def _chained(ways_made: F64) -> F64:
+    """Return where the ways lead one after the other, shape (3,)."""
+    yaw = np.concatenate(([0.0], np.cumsum(ways_made[:, 2])))
+    c, s = np.cos(yaw[:-1]), np.sin(yaw[:-1])
+    x, y = ways_made[:, 0], ways_made[:, 1]
+    return np.array((np.sum(c * x - s * y), np.sum(s * x + c * y), yaw[-1]))
