@@ -14,6 +14,7 @@ from filterpy.kalman import predict, update
 from estimators.belief import F64
 
 POSITION = np.eye(2, 4)  # what of the state is measured
+PLANE = np.eye(2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,12 +42,12 @@ class ConstantVelocity:
 
 def corrected(motion: Motion, position_m: F64, sigma_m: float) -> Motion:
     """Return the motion after a position, shape (2,), was measured with a standard deviation per axis."""
-    state, covariance = update(motion.state, motion.covariance, position_m, sigma_m**2 * np.eye(2), POSITION)
+    state, covariance = update(motion.state, motion.covariance, position_m, sigma_m**2 * PLANE, POSITION)
     return Motion(state, 0.5 * (covariance + covariance.T))
 
 
 def squared_distances(motion: Motion, positions_m: F64, sigmas_m: F64) -> F64:
     """Return the squared Mahalanobis distances, shape (n,), of measured positions, shape (n, 2), with sigmas, shape (n,)."""
     offset = positions_m - motion.state[:2]
-    spread = motion.covariance[:2, :2] + sigmas_m[:, None, None] ** 2 * np.eye(2)  # (n, 2, 2)
+    spread = motion.covariance[:2, :2] + sigmas_m[:, None, None] ** 2 * PLANE  # (n, 2, 2)
     return np.asarray(np.einsum("ni,nij,nj->n", offset, np.linalg.inv(spread), offset))

@@ -16,6 +16,7 @@ from estimators.remembered import Remembered
 from estimators.rolling import transfer
 from estimators.tracking_kernels import apparent_disc, centre_of
 
+STATIC_SHARE = 0.5  # of a connected surface; from here on the rest is taken for a part of the same wall
 NEIGHBOURS = np.ones((3, 3), dtype=np.uint8)
 
 
@@ -34,7 +35,7 @@ class Segment:
 
     points: F64  # (n, 2), centres of its cells in odom
     disc: Disc  # what it looks like, by its width
-    loose: bool  # whether most of it stands on open ground, apart from all that is static
+    loose: bool  # whether most of it stands on open ground, and no wall hangs together with it
 
 
 def warm_up() -> None:
@@ -54,7 +55,7 @@ class Surfaces:
 
     lattice: Lattice
     unexplained: Mask  # (rows, columns)
-    loose: Mask  # (rows, columns); on open ground, and nothing static hangs together with it
+    loose: Mask  # (rows, columns); on open ground, and no wall hangs together with it
 
 
 def surfaces_of(frame: FrameLabels, remembered: Remembered) -> Surfaces:
@@ -68,10 +69,12 @@ def surfaces_of(frame: FrameLabels, remembered: Remembered) -> Surfaces:
     static = transfer((remembered.grid.label == OCCUPIED) & ~remembered.came, remembered.grid.lattice, lattice, False)
     explained = cv2.dilate(static.view(np.uint8), NEIGHBOURS) != 0
     _, component = cv2.connectedComponents(_joined(seen), connectivity=8)
-    holds_static = np.zeros(component.max() + 1, dtype=np.bool_)
-    holds_static[component[seen & explained]] = True
+    unexplained = np.asarray(seen & ~explained)
+    length = int(component.max()) + 1
+    cells, loose_cells = (np.bincount(component[some], minlength=length) for some in (seen, unexplained))
+    apart = loose_cells > STATIC_SHARE * cells
     open_ground = transfer(remembered.open, remembered.grid.lattice, lattice, False)
-    return Surfaces(lattice, np.asarray(seen & ~explained), np.asarray(open_ground & ~holds_static[component]))
+    return Surfaces(lattice, unexplained, np.asarray(open_ground & apart[component]))
 
 
 def _joined(cells: Mask) -> U8:

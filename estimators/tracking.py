@@ -10,6 +10,7 @@ Source of the scheme: Bar-Shalom, Li, Kirubarajan, Estimation with Applications 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -98,10 +99,18 @@ class GridTracker:
         return {int(t): int(s) for t, s in zip(*linear_sum_assignment(cost), strict=True) if cost[t, s] < BEYOND}
 
     def _distances(self, track: Followed, found: list[Segment], lattice: Lattice) -> F64:
-        """Return the squared distances, shape (segments,), of a track."""
-        centres = np.array([centred(segment, track.radius_m, lattice) for segment in found])
-        sigmas_m = np.array([self._sigma_m(track, segment) for segment in found])
-        return squared_distances(track.motion, centres, sigmas_m)
+        """Return the squared distances, shape (segments,), of a track; `BEYOND` for what is out of any question."""
+        at, spread = track.disc, track.motion.covariance
+        doubt_m = math.sqrt(spread[0, 0] + spread[1, 1]) + self._settings.sigma_m + track.radius_m
+        reach_m = math.sqrt(self._settings.gate) * doubt_m + track.radius_m
+        near = [math.hypot(one.disc.x_m - at.x_m, one.disc.y_m - at.y_m) < reach_m for one in found]
+        close = [segment for segment, is_near in zip(found, near, strict=True) if is_near]
+        distances = np.full(len(found), BEYOND)
+        if close:
+            centres = np.array([centred(segment, track.radius_m, lattice) for segment in close])
+            sigmas_m = np.array([self._sigma_m(track, segment) for segment in close])
+            distances[near] = squared_distances(track.motion, centres, sigmas_m)
+        return distances
 
     def _sigma_m(self, track: Followed, segment: Segment) -> float:
         """Return how far off a centre may be: what looks narrower than it is, is hidden in part, and who knows which."""
