@@ -138,6 +138,31 @@ def schema(
         write_text(out, text + "\n")
 
 
+calibrate_app = typer.Typer(help="Identify what the data sheet does not know, and write it back as YAML.", no_args_is_help=True)
+app.add_typer(calibrate_app, name="calibrate")
+
+
+@calibrate_app.command("base")
+def calibrate_base(
+    config: Config,
+    output: Annotated[Path, typer.Option(help="the configuration to write, which extends CONFIG")] = Path("calibrated.yaml"),
+    changes: Annotated[list[str] | None, typer.Option("--set", metavar="a.b=c", help="override a value; repeatable")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="seed of everything that is drawn")] = 0,
+    force: Annotated[bool, typer.Option("--force", help="overwrite an existing file")] = False,
+) -> None:
+    """Drive around slowly (2 m of free floor on every side) and identify wheels, gyro and delays."""
+    from runtime import calibrate  # noqa: PLC0415 - imported here, as above
+
+    if output.exists() and not force:
+        raise ConfigurationError(f"--output {output} exists already; --force overwrites it")
+    require_writable(output, "--output")
+    with console.status("driving"):
+        calibration = calibrate.calibrate(config, tuple(changes or ()), seed)
+    console.print(calibrate.table_of(calibration))
+    calibrate.write(calibration, config, output)
+    console.print(f"written to {output}")
+
+
 @app.command()
 def review(
     log: Annotated[Path, typer.Argument(metavar="LOG", help="a recording made by trundle run")],

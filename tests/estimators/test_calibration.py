@@ -135,8 +135,8 @@ def test_standard_deviations_are_those_of_a_line():
 def test_the_path_of_a_circle_is_exact():
     twist = BodyTwist(0.3, 0.0, 0.5)
     samples = [wheels(i * 100 * MS, SKID.wheel_rates(twist) * 0.1 * i, SKID.wheel_rates(twist)) for i in range(41)]
-    truth = [TruthSample(Stamp(i * 600 * MS, 0, i), SE2(), twist, (), 1.0, ()) for i in range(11)]
-    path = wheel_path(drive_of(samples, [], truth), SKID)
+    truth = [TruthSample(Stamp(i * 400 * MS, 0, i), SE2(), twist, (), 1.0, ()) for i in range(11)]
+    path = wheel_path(drive_of(samples, [], truth, spacing_s=0.2), SKID)
     end = SE2().integrate(0.3, 0.0, 0.5, 4.0)
     assert path[-1, 0] == pytest.approx(end.x)
     assert path[-1, 1] == pytest.approx(end.y)

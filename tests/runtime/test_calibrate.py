@@ -1,0 +1,50 @@
+"""`trundle calibrate base` from end to end: drives a simulated base, finds its errors, writes what the odometry is to be told."""
+
+import pytest
+
+from drivers.interface.errors import ConfigurationError
+from runtime import configuration
+from runtime.calibrate import calibrate
+from runtime.cli import run_command
+from runtime.manoeuvres import calibration_legs, overrides_of
+
+FLOOR = ("robot.camera=null", "world.margin_m=6", "loop.rate_hz=10")
+RADIUS_ERROR, HEADING_ERROR_RAD = (0.02, -0.015, 0.01), (0.026, -0.01, 0.015)
+
+
+def sets(changes):
+    return [part for change in changes for part in ("--set", change)]
+
+
+def test_an_omni_base_is_calibrated_and_the_file_can_be_run(tmp_path, capsys):
+    errors = [
+        f"robot.base.wheel_radius_error={list(RADIUS_ERROR)}",
+        f"robot.base.wheel_heading_error_rad={list(HEADING_ERROR_RAD)}",
+    ]
+    path = tmp_path / "calibrated.yaml"
+    assert run_command(["calibrate", "base", "square", "--output", str(path), *sets([*FLOOR, *errors])]) == 0
+    assert "wheels' drift at the end" in capsys.readouterr().out
+    odometry = configuration.load(str(path)).estimator.settings.odometry
+    assert odometry.geometry.wheel_radius_m == pytest.approx([0.05 * (1 + error) for error in RADIUS_ERROR], rel=2e-3)
+    assert odometry.geometry.heading_error_rad == pytest.approx(HEADING_ERROR_RAD, abs=2e-3)
+    assert odometry.gyro_scale == pytest.approx(1.0, abs=1e-3)
+    assert run_command(["calibrate", "base", "square", "--output", str(path)]) == 2  # it exists
+    assert "--force" in capsys.readouterr().err
+
+
+def test_a_robot_without_truth_or_base_is_refused():
+    with pytest.raises(ConfigurationError, match=r"robot\.truth"):
+        calibrate("square", ("robot.truth=null",))
+    with pytest.raises(ConfigurationError, match=r"robot\.base"):
+        calibrate("square", ("robot.base=null", "planner.name=idle"))
+
+
+def test_the_manoeuvres_keep_to_the_caps_and_come_back():
+    limits = configuration.load("square").devices
+    base = next(choice for name, choice in limits if name == "base").settings.limits
+    legs = calibration_legs(base)
+    assert all(abs(leg.twist.vx) <= base.velocity.vx and abs(leg.twist.vy) <= base.velocity.vy for leg in legs)
+    for axis in ("vx", "vy"):
+        straight = [leg for leg in legs if leg.twist.wz == 0.0]
+        assert sum(getattr(leg.twist, axis) * leg.duration_s for leg in straight) == pytest.approx(0.0)
+    assert any(text.startswith("mission.time_limit_s=") for text in overrides_of(legs))
