@@ -52,7 +52,7 @@ class Scene:
         return self.tracker.tracks_at(stamp_ns)
 
     def spoil(self, depth):
-        spoilt = depth * (1.0 + 0.002 * depth * self.random.normal(size=depth.shape))
+        spoilt = depth * (1.0 + 0.002 * np.minimum(depth, 9.0) * self.random.normal(size=depth.shape))
         return np.where(self.random.random(depth.shape) < 0.02, np.inf, spoilt)
 
     def nearest(self, tracks, walker):
