@@ -121,7 +121,8 @@ class GridTracker:
         gain = settings.radius_gain if wider_m > 0.0 else 0.1 * settings.radius_gain
         radius_m = max(track.radius_m + gain * wider_m, settings.radius_min_m)
         motion = corrected(track.motion, centred(segment, radius_m, lattice), self._sigma_m(track, segment))
-        return Followed(track.identity, motion, radius_m, track.hits + 1, self._stamp_ns)
+        seen_ns = self._stamp_ns if segment.loose else track.seen_ns  # or a track that met a wall's end would follow it
+        return Followed(track.identity, motion, radius_m, track.hits + 1, seen_ns)
 
     def _lives(self, track: Followed, seen: OccupancyGrid) -> bool:
         row, column = (int(index[0]) for index in seen.lattice.cell_of(track.motion.state[None, :2]))
