@@ -64,5 +64,5 @@ def _is_number(schema: dict) -> bool:
 
 def _bounds(schema: dict) -> set[str]:
     return {key for option in (schema, *schema.get("anyOf", ())) for key in option} & {
-        "minimum", "exclusiveMinimum", "maximum", "exclusiveMaximum",
+        "minimum", "exclusiveMinimum", "maximum", "exclusiveMaximum", "enum",
     }  # fmt: skip
