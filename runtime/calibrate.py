@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -53,10 +54,12 @@ def drive_from(sensed: tuple[Sensed, ...]) -> Drive:
 
 def odometry_keys(calibration: BaseCalibration) -> dict[str, Any]:
     """Return the keys of `estimator.odometry` that say what was found."""
-    keys: dict[str, Any] = {"geometry": calibration.wheels.geometry.model_dump(mode="json")}
+    ekf: dict[str, Any] = asdict(calibration.trust)
+    keys: dict[str, Any] = {"geometry": calibration.wheels.geometry.model_dump(mode="json"), "ekf": ekf}
     if calibration.gyro is not None:
         keys |= {"gyro_bias_rad_s": calibration.gyro.bias_rad_s, "gyro_scale": calibration.gyro.scale}
-        keys |= {"wheels_late_s": calibration.wheels_late_s, "ekf": {"gyro_bias_std_rad_s": BIAS_REPEATS_RAD_S}}
+        keys |= {"wheels_late_s": calibration.wheels_late_s}
+        ekf["gyro_bias_std_rad_s"] = BIAS_REPEATS_RAD_S
     return keys
 
 

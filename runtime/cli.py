@@ -88,25 +88,22 @@ def evaluate(
     markdown: Annotated[Path | None, typer.Option(help="write the table here as Markdown")] = None,
 ) -> None:
     """Run an experiment over its seeds and print its table beside the published figures."""
-    from runtime import experiment as experiments  # noqa: PLC0415 - imported here, as above
-    from runtime import experiment_table  # noqa: PLC0415
+    from runtime.evaluation import load_evaluation  # noqa: PLC0415 - imported here, as above
 
-    loaded = experiments.load_experiment(experiment)
+    evaluation = load_evaluation(experiment, seeds, tuple(changes or ()))
     require_writable(json, "--json")
     require_writable(markdown, "--markdown")
-    todo = experiments.cases(loaded, seeds, tuple(changes or ()))
     with Progress(console=console) as progress:
-        task = progress.add_task(loaded.title, total=len(todo))
-        reports = experiments.run_all(todo, jobs, lambda case, report: progress.advance(task))
-    rows = experiment_table.rows(loaded, reports)
-    table = Table(*experiment_table.HEAD, title=loaded.title)
-    for row in rows:
-        table.add_row(*row.cells())
+        task = progress.add_task(evaluation.title, total=evaluation.steps)
+        found = evaluation.run(jobs, lambda: progress.advance(task))
+    table = Table(*found.head, title=evaluation.title)
+    for row in found.rows:
+        table.add_row(*row)
     console.print(table)
     if json is not None:
-        write_text(json, experiment_table.as_json(reports))
+        write_text(json, found.json)
     if markdown is not None:
-        write_text(markdown, experiment_table.markdown(rows))
+        write_text(markdown, found.markdown())
 
 
 @app.command(name="list")

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable
 from dataclasses import dataclass
-from multiprocessing import get_context
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
-from drivers.interface.errors import ConfigurationError
 from drivers.interface.settings import Settings
 from runtime import yaml_files
+from runtime.evaluation import EvaluationTable
 from runtime.referee import Outcome
 from runtime.report import RunReport
+from runtime.side_by_side import side_by_side
 
 
 class Experiment(Settings):
@@ -35,16 +33,6 @@ class Case:
     variant: str
     seed: int
     overrides: tuple[str, ...]
-
-
-def load_experiment(name_or_path: str) -> Experiment:
-    """Load an experiment by path or shipped name.  Raises ConfigurationError with file and key."""
-    path = yaml_files.find(name_or_path, "experiments")
-    try:
-        return Experiment.model_validate(yaml_files.read(path, "experiments"))
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise ConfigurationError(f"{path}: {'.'.join(map(str, first['loc']))}: {first['msg']}") from error
 
 
 def cases(experiment: Experiment, seeds: int | None = None, also: tuple[str, ...] = ()) -> tuple[Case, ...]:
@@ -69,25 +57,32 @@ def run_case(case: Case) -> RunReport:
     return result.report
 
 
-def run_all(todo: tuple[Case, ...], jobs: int, done: Callable[[Case, RunReport], None]) -> dict[Case, RunReport]:
-    """Run all cases, `jobs` at a time; `done` hears of each as it ends.  The result does not depend on which came first."""
-    reports: dict[Case, RunReport] = {}
-    for case, report in _each(todo, jobs):
-        reports[case] = report
-        done(case, report)
-    return {case: reports[case] for case in todo}
+class RunsEvaluation:
+    """Configurations times variants times seeds, and how the runs ended."""
 
+    def __init__(self, settings: Experiment, seeds: int | None, changes: tuple[str, ...]) -> None:
+        """Lay out the runs; `changes` are made in every one."""
+        self._experiment, self._todo = settings, cases(settings, seeds, changes)
 
-def _each(todo: tuple[Case, ...], jobs: int) -> Iterator[tuple[Case, RunReport]]:
-    if jobs == 1:
-        yield from ((case, run_case(case)) for case in todo)
-        return
-    os.environ.setdefault("OMP_NUM_THREADS", "1")  # one core a process: more threads would only push each other aside
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        futures = {pool.submit(run_case, case): case for case in todo}
-        try:
-            for future in as_completed(futures):
-                yield futures[future], future.result()
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    @classmethod
+    def from_mapping(cls, content: yaml_files.Mapping, seeds: int | None, changes: tuple[str, ...]) -> RunsEvaluation:
+        """Read the file's keys; raises pydantic's ValidationError."""
+        return cls(Experiment.model_validate(content), seeds, changes)
+
+    @property
+    def title(self) -> str:
+        """The experiment's own."""
+        return self._experiment.title
+
+    @property
+    def steps(self) -> int:
+        """The number of runs."""
+        return len(self._todo)
+
+    def run(self, jobs: int, done: Callable[[], None]) -> EvaluationTable:
+        """Run them all."""
+        from runtime import experiment_table  # noqa: PLC0415 - it knows this module
+
+        reports = side_by_side(self._todo, run_case, jobs, lambda case, report: done())
+        rows = experiment_table.rows(self._experiment, reports)
+        return EvaluationTable(experiment_table.HEAD, tuple(row.cells() for row in rows), experiment_table.as_json(reports))

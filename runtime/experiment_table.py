@@ -62,13 +62,6 @@ def rows(experiment: Experiment, reports: dict[Case, RunReport]) -> tuple[Row, .
     return tuple(_row(experiment, configuration, variant, group) for (configuration, variant), group in grouped.items())
 
 
-def markdown(table: Iterable[Row]) -> str:
-    """Return the table as Markdown."""
-    lines = [f"| {' | '.join(HEAD)} |", "|" + "---|" * len(HEAD)]
-    lines += [f"| {' | '.join(row.cells())} |" for row in table]
-    return "\n".join(lines) + "\n"
-
-
 def as_json(reports: dict[Case, RunReport]) -> str:
     """Return every run's report as JSON."""
     runs = [{"configuration": case.configuration, "variant": case.variant} | asdict(report) for case, report in reports.items()]

@@ -26,6 +26,18 @@ class DriftError:
 
 
 @dataclass(frozen=True, slots=True)
+class WheelTrust:
+    """How far calibrated wheels can be believed, in the terms of `EkfSettings`."""
+
+    way_scale_std: float
+    yaw_scale_std: float
+    position_variance_m2_per_m: float
+    position_variance_m2_per_rad: float
+    yaw_variance_rad2_per_m: float
+    yaw_variance_rad2_per_rad: float
+
+
+@dataclass(frozen=True, slots=True)
 class BaseCalibration:
     """What a drive has told; `gyro` is None on a robot that has none."""
 
@@ -33,6 +45,7 @@ class BaseCalibration:
     gyro: GyroCalibration | None
     before: DriftError
     after: DriftError
+    trust: WheelTrust
 
     @property
     def found(self) -> tuple[Identified, ...]:
@@ -54,7 +67,32 @@ def calibrate_base(drive: Drive, nominal: WheelKinematics) -> BaseCalibration:
     wheels = calibrate_wheels(drive, nominal)
     gyro = calibrate_gyro(drive) if len(drive.gyro_s) >= LEAST_SAMPLES else None
     calibrated = wheels.geometry.kinematics
-    return BaseCalibration(wheels, gyro, drift_error(drive, nominal), drift_error(drive, calibrated, wheels.late_s))
+    before, after = drift_error(drive, nominal), drift_error(drive, calibrated, wheels.late_s)
+    return BaseCalibration(wheels, gyro, before, after, wheel_trust(drive, wheels))
+
+
+def wheel_trust(drive: Drive, wheels: WheelCalibration) -> WheelTrust:
+    """Return what the residuals say of slip, and the parameters' standard deviations of the geometry.
+
+    Each variance is that of all residuals over all ways, or over all turns: an upper bound, as neither alone has caused them.
+    """
+    made, true = wheel_ways(drive, wheels.geometry.kinematics, wheels.late_s), ways(drive.references)
+    position = 0.5 * float(np.sum((made - true)[:, :2] ** 2))
+    yaw = float(np.sum((made - true)[:, 2] ** 2))
+    way_m, turned_rad = float(np.sum(np.linalg.norm(true[:, :2], axis=1))), float(np.sum(np.abs(true[:, 2])))
+    return WheelTrust(
+        way_scale_std=_worst(wheels.found, "radius_m"),
+        yaw_scale_std=max(_worst(wheels.found, "distance_m"), _worst(wheels.found, "track_m")),
+        position_variance_m2_per_m=position / way_m,
+        position_variance_m2_per_rad=position / turned_rad,
+        yaw_variance_rad2_per_m=yaw / way_m,
+        yaw_variance_rad2_per_rad=yaw / turned_rad,
+    )
+
+
+def _worst(found: tuple[Identified, ...], kind: str) -> float:
+    """Return the largest relative standard deviation among parameters of a kind, by a part of their names."""
+    return max((parameter.std / parameter.value for parameter in found if kind in parameter.unknown.name), default=0.0)
 
 
 def drift_error(drive: Drive, kinematics: WheelKinematics, late_s: float = 0.0) -> DriftError:

@@ -36,16 +36,16 @@ def calibrate_wheels(drive: Drive, nominal: WheelKinematics) -> WheelCalibration
     Raises:
         ConfigurationError: the data do not determine a parameter, or the base is of a kind that has none to identify.
     """
-    unknowns = (*_unknowns(nominal), DELAY)
+    unknowns = (*unknowns_of(nominal), DELAY)
     measured = ways(drive.references)
 
     def residuals(values: F64) -> F64:
-        made = wheel_ways(drive, _geometry(nominal, values[:-1]).kinematics, float(values[-1]))
+        made = wheel_ways(drive, geometry_of(nominal, values[:-1]).kinematics, float(values[-1]))
         return np.asarray(((made - measured) / WAY_STD).ravel())
 
     found = identify(unknowns, residuals)
     values = np.array([parameter.value for parameter in found])
-    return WheelCalibration(_geometry(nominal, values[:-1]), float(values[-1]), found)
+    return WheelCalibration(geometry_of(nominal, values[:-1]), float(values[-1]), found)
 
 
 def wheel_path(drive: Drive, kinematics: WheelKinematics) -> F64:
@@ -77,7 +77,8 @@ def _row(kinematics: WheelKinematics, turn: F64) -> tuple[float, float, float]:
     return twist.vx, twist.vy, twist.wz
 
 
-def _unknowns(nominal: WheelKinematics) -> tuple[Unknown, ...]:
+def unknowns_of(nominal: WheelKinematics) -> tuple[Unknown, ...]:
+    """Return what is not known of a base of this kind.  Raises ConfigurationError where the kind has nothing to identify."""
     match nominal:
         case OmniThreeWheel():
             radii = [_length(f"wheel_radius_m[{i}]", r, RADIUS_STD) for i, r in enumerate(nominal.wheel_radius_m)]
@@ -100,7 +101,8 @@ def _length(name: str, nominal_m: float, largest_share: float) -> Unknown:
     return Unknown(name, "m", nominal_m, 0.02 * nominal_m, largest_share * nominal_m)
 
 
-def _geometry(nominal: WheelKinematics, values: F64) -> OmniGeometry | SkidSteerGeometry:
+def geometry_of(nominal: WheelKinematics, values: F64) -> OmniGeometry | SkidSteerGeometry:
+    """Return the geometry that the values of `unknowns_of` stand for."""
     v = [float(value) for value in values]
     if isinstance(nominal, OmniThreeWheel):
         radii, distances, headings = (v[0], v[1], v[2]), (v[3], v[4], v[5]), (v[6], v[7], v[8])

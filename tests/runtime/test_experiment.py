@@ -9,8 +9,10 @@ import pytest
 from drivers.interface.errors import ConfigurationError
 from runtime import experiment_table
 from runtime.cli import run_command
-from runtime.experiment import Case, Experiment, cases, load_experiment, run_all
+from runtime.evaluation import EvaluationTable, load_evaluation
+from runtime.experiment import Case, Experiment, cases, run_case
 from runtime.report import RunReport
+from runtime.side_by_side import side_by_side
 from runtime.yaml_files import shipped
 
 SHORT = ("mission.time_limit_s=1.5",)
@@ -60,8 +62,8 @@ def test_the_cases_are_all_combinations_in_order() -> None:
 
 def test_side_by_side_gives_what_one_after_the_other_gives() -> None:
     todo = cases(EXPERIMENT, seeds=1, also=SHORT)
-    one = run_all(todo, 1, lambda case, report: None)
-    two = run_all(todo, 2, lambda case, report: None)
+    one = side_by_side(todo, run_case, 1, lambda case, report: None)
+    two = side_by_side(todo, run_case, 2, lambda case, report: None)
     assert list(one) == list(two) == list(todo)
     for case in todo:
         assert replace(one[case], stage_ms={}, realtime_factor=0.0) == replace(two[case], stage_ms={}, realtime_factor=0.0)
@@ -76,7 +78,7 @@ def test_a_row_counts_outcomes_and_averages_what_is_known() -> None:
     }
     (row,) = experiment_table.rows(EXPERIMENT, reports)
     assert row.cells() == ("door", "dwa", "2/3", "1/3", "0/3", "0/3", "30 %", "0.10 m", "15.0 s", "0.20 m, 0.0°")
-    table = experiment_table.markdown([row]).splitlines()
+    table = EvaluationTable(experiment_table.HEAD, (row.cells(),), "").markdown().splitlines()
     assert len({line.count("|") for line in table}) == 1
     assert [run["seed"] for run in json.loads(experiment_table.as_json(reports))] == [0, 0, 0]
 
@@ -89,14 +91,14 @@ def test_without_truth_the_table_stays_empty_there() -> None:
 
 @pytest.mark.parametrize("name", shipped("experiments"))
 def test_shipped_experiments_load(name: str) -> None:
-    assert cases(load_experiment(name))
+    assert load_evaluation(name, None, ()).steps > 0
 
 
 def test_a_broken_experiment_names_file_and_key(tmp_path: Path) -> None:
     path = tmp_path / "e.yaml"
     path.write_text("title: t\nconfigurations: [door]\nvariants: {a: []}\nseed: 3\n")
     with pytest.raises(ConfigurationError, match=r"e\.yaml: seed: "):
-        load_experiment(str(path))
+        load_evaluation(str(path), None, ())
 
 
 def test_the_command_writes_table_and_reports(tmp_path: Path) -> None:

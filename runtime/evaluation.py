@@ -1,0 +1,72 @@
+"""What `trundle evaluate` runs: an experiment file's `kind` names which evaluation it describes; its own keys are that kind's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from pydantic import ValidationError
+
+from drivers.interface.errors import ConfigurationError, unknown_name
+from runtime import yaml_files
+
+
+@dataclass(frozen=True, slots=True)
+class EvaluationTable:
+    """What an evaluation found, for the eye and for other programs."""
+
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    json: str  # every single result
+
+    def markdown(self) -> str:
+        """Return the table as Markdown."""
+        lines = [f"| {' | '.join(self.head)} |", "|" + "---|" * len(self.head)]
+        lines += [f"| {' | '.join(row)} |" for row in self.rows]
+        return "\n".join(lines) + "\n"
+
+
+class Evaluation(Protocol):
+    """An experiment that has been read, with what the command line adds to it."""
+
+    @classmethod
+    def from_mapping(cls, content: yaml_files.Mapping, seeds: int | None, changes: tuple[str, ...]) -> Evaluation:
+        """Read the file's keys (`kind` taken out); raises pydantic's ValidationError."""
+        ...
+
+    @property
+    def title(self) -> str:
+        """What stands over the table."""
+        ...
+
+    @property
+    def steps(self) -> int:
+        """How many times `run` will say that something is done."""
+        ...
+
+    def run(self, jobs: int, done: Callable[[], None]) -> EvaluationTable:
+        """Do everything, `jobs` at a time."""
+        ...
+
+
+def load_evaluation(name_or_path: str, seeds: int | None, changes: tuple[str, ...]) -> Evaluation:
+    """Read an experiment by path or shipped name; without a `kind` it is one of `runs`.
+
+    Raises:
+        ConfigurationError: with file and key.
+    """
+    from runtime.experiment import RunsEvaluation  # noqa: PLC0415 - each kind knows this contract
+    from runtime.odometry_evaluation import OdometryEvaluation  # noqa: PLC0415
+
+    kinds: dict[str, type[RunsEvaluation | OdometryEvaluation]] = {"runs": RunsEvaluation, "odometry": OdometryEvaluation}
+    path = yaml_files.find(name_or_path, "experiments")
+    content = yaml_files.read(path, "experiments")
+    chosen = str(content.pop("kind", "runs"))
+    if chosen not in kinds:
+        raise ConfigurationError(f"{path}: kind: {unknown_name('kind of experiment', chosen, kinds)}")
+    try:
+        return kinds[chosen].from_mapping(content, seeds, changes)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise ConfigurationError(f"{path}: {'.'.join(map(str, first['loc']))}: {first['msg']}") from error
