@@ -18,7 +18,12 @@ Geometry = Annotated[OmniGeometry | SkidSteerGeometry, Field(discriminator="kind
 
 
 class OdometrySettings(DeadReckoningSettings):
-    """Dead reckoning's own settings, those that both kinds share, and the filter's."""
+    """Dead reckoning's own settings, those that both kinds share, and the filter's.
+
+    Dead reckoning is the default because it needs nothing.  The filter is several times better on a robot that stands still for
+    a second or two before it sets off, or that is calibrated; without either it takes the wheels' systematic errors for a bias
+    of the gyro, and is worse (`trundle evaluate odometry`).
+    """
 
     kind: Literal["dead_reckoning", "ekf"] = Field(default="dead_reckoning", description="wheels alone, or fused with the IMU")
     geometry: Geometry | None = Field(default=None, description="as calibrated; none: the base's own")

@@ -14,6 +14,8 @@ from estimators.calibration.gyro import GyroCalibration, calibrate_gyro
 from estimators.calibration.identify import Identified
 from estimators.calibration.wheels import WheelCalibration, calibrate_wheels, wheel_ways
 
+LEAST_SCALE_STD = 0.01  # load, wear and floor change more than a drive determines
+
 
 @dataclass(frozen=True, slots=True)
 class DriftError:
@@ -81,8 +83,8 @@ def wheel_trust(drive: Drive, wheels: WheelCalibration) -> WheelTrust:
     yaw = float(np.sum((made - true)[:, 2] ** 2))
     way_m, turned_rad = float(np.sum(np.linalg.norm(true[:, :2], axis=1))), float(np.sum(np.abs(true[:, 2])))
     return WheelTrust(
-        way_scale_std=_worst(wheels.found, "radius_m"),
-        yaw_scale_std=max(_worst(wheels.found, "distance_m"), _worst(wheels.found, "track_m")),
+        way_scale_std=max(LEAST_SCALE_STD, _worst(wheels.found, "radius_m")),
+        yaw_scale_std=max(LEAST_SCALE_STD, _worst(wheels.found, "distance_m"), _worst(wheels.found, "track_m")),
         position_variance_m2_per_m=position / way_m,
         position_variance_m2_per_rad=position / turned_rad,
         yaw_variance_rad2_per_m=yaw / way_m,
