@@ -8,7 +8,6 @@ from pydantic import Field
 
 from drivers.interface.kinematics import WheelKinematics
 from estimators.dead_reckoning import DeadReckoning, DeadReckoningSettings
-from estimators.ekf_odometry import EkfOdometry
 from estimators.ekf_settings import EkfSettings
 from estimators.odometry import Odometry
 from estimators.odometry_limits import MotionLimits
@@ -39,6 +38,8 @@ def build_odometry(settings: OdometrySettings, kinematics: WheelKinematics | Non
         kinematics = settings.geometry.kinematics
     if settings.kind == "dead_reckoning":
         return DeadReckoning(settings, kinematics)
+    from estimators.ekf_odometry import EkfOdometry  # noqa: PLC0415 - FilterPy brings 40 MB that only those who filter need carry
+
     limits = MotionLimits(
         settings.speed_max_m_s,
         settings.turn_rate_max_rad_s,

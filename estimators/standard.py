@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -12,7 +12,6 @@ from drivers.interface.samples import JointSample
 from drivers.interface.sensed import Sensed
 from drivers.interface.settings import Settings
 from drivers.interface.stateful import pack, unpack
-from estimators import segmentation
 from estimators.belief import FREE, Belief, EstimatorFault, Track
 from estimators.clearance import ClearanceEstimator, ClearanceSettings
 from estimators.depth_grid import DepthGrid, DepthGridSettings
@@ -24,9 +23,12 @@ from estimators.memory import MemorySettings, memory_of
 from estimators.odometry import Odometry, OdometryEstimate, latest_valid_ns
 from estimators.odometry_choice import OdometrySettings, build_odometry
 from estimators.scan_grid import ScanGrid, ScanGridSettings
-from estimators.tracking import GridTracker, TrackingSettings
+from estimators.tracking_settings import TrackingSettings
 from estimators.truth_odometry import TruthOdometry
 from estimators.truth_tracks import tracks_from_truth
+
+if TYPE_CHECKING:
+    from estimators.tracking import GridTracker
 
 
 class StandardSettings(Settings):
@@ -64,7 +66,7 @@ class StandardEstimator:
         self._filter = GridFilter(settings.depth.filter, settings.cell_m) if filtered else None
         self._memory = memory_of(settings.memory, settings.cell_m, setup.robot_radius_m)
         self._clearance = ClearanceEstimator(settings.clearance)
-        self._tracker = GridTracker(settings.tracking) if settings.tracks == "grid" else None
+        self._tracker = _tracker_of(settings)
         self._grid = self._memory.grid
         self._frame_ns: int | None = None  # capture time of the newest frame used
         self._joints: JointSample | None = None
@@ -73,7 +75,8 @@ class StandardEstimator:
         """Compile every kernel; what is believed stays as it is."""
         self._odometry.warm_up()
         self._source.warm_up()
-        segmentation.warm_up()
+        if self._tracker is not None:
+            self._tracker.warm_up()
         spare = memory_of(self._settings.memory, self._settings.cell_m, self._setup.robot_radius_m)
         spare.merge(FrameLabels(spare.grid, spare.grid.label == FREE), 0, SE2())
 
@@ -166,6 +169,14 @@ class StandardEstimator:
         self._grid = self._memory.grid
         self._frame_ns = int(state["frame_ns"][0]) if state["frame_ns"].size else None
         self._joints = unpack_joints(state["joints"])
+
+
+def _tracker_of(settings: StandardSettings) -> GridTracker | None:
+    if settings.tracks != "grid":
+        return None
+    from estimators.tracking import GridTracker  # noqa: PLC0415 - FilterPy brings 40 MB that only those who filter need carry
+
+    return GridTracker(settings.tracking)
 
 
 def _odometry_of(settings: StandardSettings, setup: EstimatorSetup) -> Odometry:

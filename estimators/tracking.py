@@ -14,38 +14,20 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from pydantic import Field
 from scipy.optimize import linear_sum_assignment
 
 from drivers.interface.samples import frozen_array
-from drivers.interface.settings import Settings
 from drivers.interface.stateful import pack, unpack
+from estimators import segmentation
 from estimators.belief import F64, FREE, Lattice, OccupancyGrid, Track
 from estimators.constant_velocity import ConstantVelocity, Motion, corrected, squared_distances
 from estimators.labelling import FrameLabels
 from estimators.remembered import Remembered
 from estimators.segmentation import Disc, Segment, centred, segments, surfaces_of
+from estimators.tracking_settings import TrackingSettings
 
 SECOND_NS = 1_000_000_000
 BEYOND = 1e6  # the cost of what is outside the gate
-
-
-class TrackingSettings(Settings):
-    """How obstacles are found, followed, and given up."""
-
-    cells_min: int = Field(default=3, ge=1, le=100, description="smaller components are noise")
-    radius_max_m: float = Field(default=0.6, gt=0.0, le=3.0, description="what looks wider is no obstacle that moves")
-    radius_min_m: float = Field(default=0.05, gt=0.0, le=1.0, description="no track is thinner")
-    sigma_m: float = Field(default=0.04, gt=0.0, le=1.0, description="of a measured centre, each axis")
-    speed_sigma_m_s: float = Field(default=0.8, gt=0.0, le=5.0, description="of a new track's velocity, each axis")
-    acceleration_m_s2: float = Field(default=3.0, gt=0.0, le=20.0, description="standard deviation of what changes a velocity")
-    gate: float = Field(default=13.8, gt=0.0, le=100.0, description="largest squared distance; 13.8: 99.9 % of two axes")
-    hits_min: int = Field(default=3, ge=1, le=100, description="frames in which a track was seen before it is given out")
-    vanish_s: float = Field(default=0.25, ge=0.0, le=10.0, description="how long it lives where its place is seen free")
-    coast_s: float = Field(default=1.5, ge=0.0, le=30.0, description="how long it lives out of sight")
-    radius_gain: float = Field(
-        default=0.3, gt=0.0, le=1.0, description="weight of a wider look, per frame; of a narrower a tenth"
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +55,10 @@ class GridTracker:
         self._tracks: list[Followed] = []  # by identity
         self._next_identity = 0
         self._stamp_ns = 0
+
+    def warm_up(self) -> None:
+        """Compile every kernel."""
+        segmentation.warm_up()
 
     def update(self, frame: FrameLabels, remembered: Remembered, stamp_ns: int) -> None:
         """Take in a frame captured at `stamp_ns`, and what the memory knows with it."""

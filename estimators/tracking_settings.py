@@ -1,0 +1,25 @@
+"""Settings of the tracker of moving obstacles."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from drivers.interface.settings import Settings
+
+
+class TrackingSettings(Settings):
+    """How obstacles are found, followed, and given up."""
+
+    cells_min: int = Field(default=3, ge=1, le=100, description="smaller components are noise")
+    radius_max_m: float = Field(default=0.6, gt=0.0, le=3.0, description="what looks wider is no obstacle that moves")
+    radius_min_m: float = Field(default=0.05, gt=0.0, le=1.0, description="no track is thinner")
+    sigma_m: float = Field(default=0.04, gt=0.0, le=1.0, description="of a measured centre, each axis")
+    speed_sigma_m_s: float = Field(default=0.8, gt=0.0, le=5.0, description="of a new track's velocity, each axis")
+    acceleration_m_s2: float = Field(default=3.0, gt=0.0, le=20.0, description="standard deviation of what changes a velocity")
+    gate: float = Field(default=13.8, gt=0.0, le=100.0, description="largest squared distance; 13.8: 99.9 % of two axes")
+    hits_min: int = Field(default=3, ge=1, le=100, description="frames in which a track was seen before it is given out")
+    vanish_s: float = Field(default=0.25, ge=0.0, le=10.0, description="how long it lives where its place is seen free")
+    coast_s: float = Field(default=1.5, ge=0.0, le=30.0, description="how long it lives out of sight")
+    radius_gain: float = Field(
+        default=0.3, gt=0.0, le=1.0, description="weight of a wider look, per frame; of a narrower a tenth"
+    )
