@@ -57,7 +57,7 @@ class FieldCbf:
             description="dt of equation 8: how long a boundary closes in unanswered; the control period, if longer",
         )
         braking_allowance: float = Field(
-            1.0,
+            1.5,
             ge=0.0,
             le=5.0,
             description="widens gate and search by so many times what the base takes to stop; 0: the paper's base stops at once",
