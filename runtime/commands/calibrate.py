@@ -1,0 +1,35 @@
+"""`trundle calibrate`: what the data sheet does not know."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from drivers.interface.errors import ConfigurationError
+from runtime.commands.options import Changes, Config, Seed, console
+from runtime.outputs import require_writable
+
+app = typer.Typer(help="Identify what the data sheet does not know, and write it back as YAML.", no_args_is_help=True)
+
+
+@app.command("base")
+def base(
+    config: Config,
+    output: Annotated[Path, typer.Option(help="the configuration to write, which extends CONFIG")] = Path("calibrated.yaml"),
+    changes: Changes = None,
+    seed: Seed = 0,
+    force: Annotated[bool, typer.Option("--force", help="overwrite an existing file")] = False,
+) -> None:
+    """Drive around slowly (2 m of free floor on every side) and identify wheels, gyro and delays."""
+    from runtime import calibrate
+
+    if output.exists() and not force:
+        raise ConfigurationError(f"--output {output} exists already; --force overwrites it")
+    require_writable(output, "--output")
+    with console.status("driving"):
+        calibration = calibrate.calibrate(config, tuple(changes or ()), seed)
+    console.print(calibrate.table_of(calibration))
+    calibrate.write(calibration, config, output)
+    console.print(f"written to {output}")
