@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from drivers.interface.clock import Clock, PacedClock, RealClock, SimClock
-from drivers.interface.devices import DeviceSetup
+from drivers.interface.devices import DeviceSetup, WorldElsewhere
 from drivers.interface.errors import ConfigurationError
 from drivers.interface.geometry import SE2
 from drivers.interface.mission import Goal, Mission
@@ -56,7 +56,10 @@ class Assembly:
 
     @property
     def world_late_s(self) -> float:
-        """For how long a paced world has kept the loop waiting; nothing else does."""
+        """For how long a paced world has kept the loop waiting, or an emulated one has stood still; nothing else does."""
+        truth = self.robot.devices.truth
+        if isinstance(truth, WorldElsewhere):
+            return truth.world_late_s
         return self.clock.world_late_ns * 1e-9 if isinstance(self.clock, PacedClock) else 0.0
 
     def pacer(self) -> Pacer:
@@ -77,8 +80,9 @@ def assemble(configuration: Configuration, seed: int) -> Assembly:
     Raises:
         ConfigurationError: parts that do not fit together; the sentence says which.
     """
-    scene = _scene(configuration, seed)
-    world = None if scene is None or configuration.world is None else MujocoWorld(scene, configuration.world.common)
+    scene = draw_scene(configuration, seed)
+    here = configuration.emulation is None  # else the world lives in `trundle emulate`; the scene is drawn all the same
+    world = MujocoWorld(scene, configuration.world.common) if here and scene and configuration.world else None
     devices, clock, lockstep = _devices(configuration, seed, world)
     mission = MissionTracker(_mission(configuration, scene))
     board = FaultBoard()
@@ -120,7 +124,8 @@ def assemble(configuration: Configuration, seed: int) -> Assembly:
     )
 
 
-def _scene(configuration: Configuration, seed: int) -> Scene | None:
+def draw_scene(configuration: Configuration, seed: int) -> Scene | None:
+    """Return the scene of this seed, with the configured start; None: the configuration has no world."""
     if configuration.world is None:
         return None
     scene: Scene = configuration.world.choice.build().draw(seed)
@@ -139,7 +144,7 @@ def _devices(configuration: Configuration, seed: int, world: MujocoWorld | None)
         built[name] = choice.build(DeviceSetup(name, seed, now_ns, world))
     # A driver that lives in real time (a device, a keyboard) says so with a class attribute.
     live = [name for name, choice in configuration.devices if getattr(choice.cls, "real_time", False)]
-    realtime = configuration.loop.realtime or bool(live)
+    realtime = configuration.loop.realtime or bool(live) or configuration.emulation is not None
     if world is None:
         clocks.append(RealClock() if realtime else SimClock())
     else:

@@ -12,6 +12,7 @@ from rich.console import Console
 
 from drivers.interface.errors import ConfigurationError, TrundleError
 from runtime.commands import calibrate
+from runtime.commands.emulate import emulate
 from runtime.commands.evaluate import evaluate
 from runtime.commands.listing import list_
 from runtime.commands.review import review
@@ -28,6 +29,7 @@ app = typer.Typer(
 errors = Console(stderr=True, soft_wrap=True)
 
 app.command()(run)
+app.command()(emulate)
 app.command()(evaluate)
 app.command(name="list")(list_)
 app.command()(schema)

@@ -47,6 +47,9 @@ class Choice:
             raise ConfigurationError(f"'{self.name}' cannot be built: {type(error).__name__}: {error}") from error
 
 
+Choices = tuple[tuple[str, Choice], ...]  # (name in the robot, part)
+
+
 @dataclass(frozen=True, slots=True)
 class Chosen(Generic[S]):
     """A chosen part and what the runtime itself needs to know about how to use it."""
@@ -81,7 +84,8 @@ class Configuration:
 
     source: str
     robot: RobotCommon
-    devices: tuple[tuple[str, Choice], ...]  # (name in the robot, driver), in the order of DEVICES
+    devices: Choices  # the drivers, in the order of DEVICES
+    emulation: Choices | None  # their firmware, where the world lives in `trundle emulate`; None: it does not
     world: Chosen[WorldSettings] | None
     estimator: Choice
     router: Choice
@@ -102,6 +106,8 @@ class Configuration:
         document: dict[str, Any] = {"robot": _plain(self.robot)}
         for name, device in self.devices:
             document["robot"][name] = {"driver": device.name} | _plain(device.settings)
+        if self.emulation is not None:
+            document["robot"]["emulation"] = {name: _plain(firmware.settings) for name, firmware in self.emulation}
         if self.world:
             document["world"] = {"scenario": self.world.choice.name} | _plain(self.world.common, self.world.choice.settings)
         document["estimator"] = {"name": self.estimator.name} | _plain(self.estimator.settings)
@@ -157,11 +163,12 @@ class _Reader:
                 raise ConfigurationError(f"{self._source}: unknown key '{key}'. Known: {', '.join(known)}")
         planner = self._chosen(content, "planner", Part.PLANNER, PlannerCommon, "dwa")
         world = self._chosen(content, "world", Part.SCENARIO, WorldSettings, None, key="scenario") if "world" in content else None
-        robot, devices = self._robot(self._mapping(content, "robot"))
+        robot, devices, emulation = self._robot(self._mapping(content, "robot"))
         return Configuration(
             source=self._source,
             robot=robot,
             devices=devices,
+            emulation=emulation,
             world=world,
             estimator=self._chosen(content, "estimator", Part.ESTIMATOR, NoCommon, "standard").choice,
             router=self._chosen(content, "router", Part.ROUTER, NoCommon, "grid").choice,
@@ -173,14 +180,33 @@ class _Reader:
             mission=self._validate(MissionSection, self._mapping(content, "mission"), "mission"),
         )
 
-    def _robot(self, content: yaml_files.Mapping) -> tuple[RobotCommon, tuple[tuple[str, Choice], ...]]:
+    def _robot(self, content: yaml_files.Mapping) -> tuple[RobotCommon, Choices, Choices | None]:
         common = {key: value for key, value in content.items() if key in RobotCommon.model_fields}
         for key in content:
-            if key not in RobotCommon.model_fields and key not in DEVICES:
-                known = ", ".join([*RobotCommon.model_fields, *DEVICES])
+            if key not in RobotCommon.model_fields and key not in (*DEVICES, "emulation"):
+                known = ", ".join([*RobotCommon.model_fields, *DEVICES, "emulation"])
                 raise ConfigurationError(f"{self._source}: unknown key 'robot.{key}'. Known: {known}")
         devices = tuple((name, self._device(content, name)) for name in DEVICES if content.get(name) is not None)
-        return self._validate(RobotCommon, common, "robot"), devices
+        emulated = content.get("emulation") is not None
+        emulation = self._emulation(self._mapping(content, "emulation", "robot."), devices) if emulated else None
+        return self._validate(RobotCommon, common, "robot"), devices, emulation
+
+    def _emulation(self, content: yaml_files.Mapping, devices: Choices) -> Choices:
+        """Choose the firmware of every device whose driver has one; settings that are not given are its defaults."""
+        emulatable = registry.names(Part.FIRMWARE)
+        drivers = {name: driver.name for name, driver in devices if driver.name in emulatable}
+        for key in content:
+            if key not in drivers:
+                raise ConfigurationError(
+                    f"{self._source}: robot.emulation.{key} is no device of this robot whose driver has firmware. "
+                    f"Known: {', '.join(drivers) or 'none'}; drivers with firmware: {', '.join(emulatable)}"
+                )
+        return tuple((name, self._firmware(content, name, driver)) for name, driver in drivers.items())
+
+    def _firmware(self, content: yaml_files.Mapping, name: str, driver: str) -> Choice:
+        cls = registry.load(Part.FIRMWARE, driver)
+        values = self._mapping(content, name, "robot.emulation.")
+        return Choice(driver, cls, self._validate(cls.Settings, values, f"robot.emulation.{name}"))
 
     def _device(self, content: yaml_files.Mapping, role: str) -> Choice:
         choice = self._chosen(content, role, Part.DRIVER, NoCommon, None, key="driver", prefix="robot.").choice

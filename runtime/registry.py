@@ -18,6 +18,7 @@ class Part(enum.Enum):
     SHIELD = "trundle.shields"
     ESTIMATOR = "trundle.estimators"
     DRIVER = "trundle.drivers"
+    FIRMWARE = "trundle.firmware"  # by the name of the driver that it stands in for
     SCENARIO = "trundle.scenarios"
 
     @property

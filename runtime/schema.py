@@ -53,7 +53,16 @@ def document() -> Any:
 
 def _robot() -> Any:
     devices = {role: _any_of(Part.DRIVER, key="driver", role=role) for role in DEVICES}
-    return _model("Robot", (RobotCommon,), {"extends": str} | devices)
+    return _model("Robot", (RobotCommon,), {"extends": str} | devices | {"emulation": _emulation()})
+
+
+def _emulation() -> Any:
+    """Return the model of `robot.emulation`: by role, the settings of any firmware that stands in for a driver of that role."""
+    roles: dict[str, list[Any]] = {}
+    for name in registry.names(Part.FIRMWARE):
+        firmware = _model(f"firmware_{name}", (registry.load(Part.FIRMWARE, name).Settings,), {})
+        roles.setdefault(registry.load(Part.DRIVER, name).role, []).append(firmware)
+    return _model("Emulation", (Settings,), {role: reduce(or_, models) for role, models in roles.items()})
 
 
 def _any_of(part: Part, *, key: str = "name", common: type[Settings] = NoCommon, role: str | None = None) -> Any:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any, ClassVar
 
 import mujoco
@@ -13,7 +12,7 @@ from pydantic import Field
 from drivers.interface.commands import BodyTwist
 from drivers.interface.devices import DeviceSetup, DeviceState
 from drivers.interface.geometry import SE2
-from drivers.interface.samples import ObstacleTruth, Stamp, TruthSample
+from drivers.interface.samples import ObstacleTruth, Stamp, TruthSample, merged_truth
 from drivers.interface.settings import Settings
 from sim_drivers.robot_clearance import RobotClearance
 from sim_drivers.sensor import SimSensor
@@ -65,9 +64,7 @@ class SimTruth(SimSensor[TruthSample]):
         """Return the truth now, or None before the first."""
         looks = self.drain()
         if looks:
-            contacts = sorted({name for look in looks for name in look.contacts})
-            clearance_m = min(look.clearance_m for look in looks)
-            self._newest = replace(looks[-1], clearance_m=clearance_m, contacts=tuple(contacts))
+            self._newest = merged_truth(looks)
         return self._newest if self._state is DeviceState.OPEN else None
 
     def _measure(self, world: MujocoWorld, stamp: Stamp) -> TruthSample:
@@ -77,7 +74,7 @@ class SimTruth(SimSensor[TruthSample]):
         return TruthSample(stamp, _pose(world, self._base_id), BodyTwist(vx, vy, wz), self._moving(world), clearance_m, contacts)
 
     def _moving(self, world: MujocoWorld) -> tuple[ObstacleTruth, ...]:
-        time_s = world.now_ns / SECOND_NS
+        time_s = world.scene_ns / SECOND_NS
         movers = [
             ObstacleTruth(m.name, m.pose_at(time_s), m.velocity_at(time_s), m.shape.bounding_radius_m) for m in world.scene.movers
         ]

@@ -67,6 +67,7 @@ class MujocoWorld:
         self._due_ns = 0
         self._now_ns = 0
         self._step_ns = 0
+        self._begun_ns: int | None = 0
         self._mover_frames, self._mover_spans = pack_movers((), ())
         self._belts: list[tuple[int, int, float]] = []
         self._model: Any = None
@@ -76,6 +77,11 @@ class MujocoWorld:
     def now_ns(self) -> int:
         """The world's time [ns]; it starts at zero."""
         return self._now_ns
+
+    @property
+    def scene_ns(self) -> int:
+        """How long the scene's walkers have been on their way [ns]."""
+        return 0 if self._begun_ns is None else self._now_ns - self._begun_ns
 
     @property
     def step_ns(self) -> int:
@@ -100,6 +106,15 @@ class MujocoWorld:
         if self._model is not None:
             raise DeviceError("the simulated world is compiled already; no device can be added to it")
         self._parts.append(part)
+
+    def hold(self) -> None:
+        """Keep the scene's walkers and belts where they start until `begin`; everything else goes on."""
+        self._begun_ns = None
+
+    def begin(self) -> None:
+        """Let the walkers and belts set off now, if they were held."""
+        if self._begun_ns is None:
+            self._begun_ns = self._now_ns
 
     def compile(self) -> None:
         """Build the model from scene and parts and settle the state at time zero.
@@ -175,11 +190,11 @@ class MujocoWorld:
         self._due_ns = min(self._next_ns, default=1 << 62)
 
     def _place_movers(self) -> None:
-        data, time_s = self._data, self._now_ns / SECOND_NS
+        data, time_s, held = self._data, self.scene_ns / SECOND_NS, self._begun_ns is None
         place_movers(time_s, self._mover_frames, self._mover_spans, data.mocap_pos, data.mocap_quat)
         for position, velocity, speed_m_s in self._belts:
             # A belt that moves on and is put back every step: contact friction sees its velocity, its place stays.
-            data.qpos[position], data.qvel[velocity] = 0.0, speed_m_s
+            data.qpos[position], data.qvel[velocity] = 0.0, 0.0 if held else speed_m_s
 
     def _check_physics(self) -> None:
         for kind in range(len(self._data.warning)):
@@ -199,7 +214,10 @@ def require_world(setup: DeviceSetup) -> MujocoWorld:
         ConfigurationError: there is none.
     """
     if not isinstance(setup.world, MujocoWorld):
-        raise ConfigurationError(f"robot.{setup.name} is a simulated device, so the configuration needs world.scenario")
+        raise ConfigurationError(
+            f"robot.{setup.name} is a simulated device, so the configuration needs world.scenario (and no robot.emulation, "
+            "which puts the world into another process)"
+        )
     return setup.world
 
 

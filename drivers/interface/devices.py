@@ -67,7 +67,7 @@ class Device(Protocol):
 
     `role` is the name of the device it drives in a robot: camera, imu, base, arm, scan, operator or truth.  A driver that
     lives in real time (hardware, an emulated device, a person) sets the class attribute `real_time = True`; the loop is then
-    paced by the host's clock.
+    paced by the host's clock.  One that plays what was recorded, and therefore obeys nobody, sets `plays_recording = True`.
     """
 
     Settings: ClassVar[type[Settings]]
@@ -173,4 +173,14 @@ class TruthSource(Device, Protocol):
 
     def latest(self) -> TruthSample | None:
         """Return the truth now, or None before the first."""
+        ...
+
+
+@runtime_checkable
+class WorldElsewhere(Protocol):
+    """A device that knows how late a simulated world in another process is."""
+
+    @property
+    def world_late_s(self) -> float:
+        """For how long that world has stood still, its machine being too slow, since `open` [s]."""
         ...

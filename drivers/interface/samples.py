@@ -5,7 +5,8 @@ All samples are immutable; their arrays are marked read-only by `frozen_array` a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -140,6 +141,12 @@ class TruthSample:
     obstacles: tuple[ObstacleTruth, ...]
     clearance_m: float  # signed, surface to surface, to the nearest obstacle
     contacts: tuple[str, ...]  # names of what the robot touches now
+
+
+def merged_truth(looks: Sequence[TruthSample]) -> TruthSample:
+    """Return the newest of some looks with the least clearance and all contacts of them, so that no short touch is missed."""
+    contacts = sorted({name for look in looks for name in look.contacts})
+    return replace(looks[-1], clearance_m=min(look.clearance_m for look in looks), contacts=tuple(contacts))
 
 
 @dataclass(frozen=True, slots=True)
