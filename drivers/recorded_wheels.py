@@ -45,6 +45,7 @@ class RecordedWheelBase:
 
     Settings: ClassVar[type[Settings]] = RecordedWheelSettings
     role: ClassVar[str] = "base"
+    plays_recording: ClassVar[bool] = True
 
     def __init__(self, settings: RecordedWheelSettings, setup: DeviceSetup) -> None:
         """Remember; the file is read when it is first needed."""

@@ -80,16 +80,30 @@ def driven(
     Raises:
         TrundleError: the drive came to no good end: a collision, a latched stop, a device that failed.
     """
+    return observed(config, (*changes, *overrides_of(legs)), seed, done, "; clear the floor 2 m around the robot")
+
+
+def observed(
+    config: str,
+    changes: tuple[str, ...] = (),
+    seed: int = 0,
+    done: Callable[[Sensed], None] = lambda _: None,
+    advice: str = "",
+) -> tuple[Sensed, ...]:
+    """Run a configuration and return all that was sensed.
+
+    Raises:
+        TrundleError: the run came to no good end; `advice` says what may help.
+    """
     sensed: list[Sensed] = []
 
     def keep(one: Sensed) -> None:
         sensed.append(one)
         done(one)
 
-    loaded = configuration.load(config, (*changes, *overrides_of(legs)))
-    result = run(loaded, RunOptions(seed=seed, progress=lambda cycle: keep(cycle.sensed)))
+    result = run(configuration.load(config, changes), RunOptions(seed=seed, progress=lambda cycle: keep(cycle.sensed)))
     if result.failure is not None:
         raise result.failure
     if result.report.outcome != "reached":
-        raise TrundleError(f"{config}: the drive ended early ({result.report.outcome}); clear the floor 2 m around the robot")
+        raise TrundleError(f"{config}: the drive ended early ({result.report.outcome}){advice}")
     return tuple(sensed)

@@ -47,7 +47,8 @@ class BaseCalibration:
     gyro: GyroCalibration | None
     before: DriftError
     after: DriftError
-    trust: WheelTrust
+    trust: WheelTrust | None  # None: the references say too little of slip and scale
+    held: tuple[str, ...] = ()  # what no such references can tell, and what therefore stays as it was
 
     @property
     def found(self) -> tuple[Identified, ...]:
@@ -101,7 +102,7 @@ def drift_error(drive: Drive, kinematics: WheelKinematics, late_s: float = 0.0) 
     """Return the error of dead reckoning by a geometry, against the references."""
     made, true = wheel_ways(drive, kinematics, late_s), ways(drive.references)
     wrong = made - true
-    end = _chained(made) - _chained(true)
+    end = chained(made) - chained(true)
     return DriftError(
         way_rms_m=float(np.sqrt(np.mean(np.sum(wrong[:, :2] ** 2, axis=1)))),
         turn_rms_rad=float(np.sqrt(np.mean(wrong[:, 2] ** 2))),
@@ -110,7 +111,7 @@ def drift_error(drive: Drive, kinematics: WheelKinematics, late_s: float = 0.0) 
     )
 
 
-def _chained(ways_made: F64) -> F64:
+def chained(ways_made: F64) -> F64:
     """Return where the ways lead one after the other, shape (3,)."""
     yaw = np.concatenate(([0.0], np.cumsum(ways_made[:, 2])))
     c, s = np.cos(yaw[:-1]), np.sin(yaw[:-1])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from drivers.interface.samples import ImuSample, TruthSample, WheelSample
 from estimators.belief import F64
 
 LEAST_SAMPLES = 10
+S = TypeVar("S", WheelSample, ImuSample)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,24 +44,39 @@ def drive_of(
     Raises:
         ConfigurationError: there are too few samples of wheels or truth.
     """
-    wheels = sorted(wheels, key=lambda sample: sample.stamp.captured_ns)
-    imu = sorted(imu, key=lambda sample: sample.stamp.captured_ns)
-    first_ns, last_ns = (wheels[0].stamp.captured_ns, wheels[-1].stamp.captured_ns) if wheels else (0, 0)
+    wheels = in_order(wheels)
+    require(len(wheels), "wheel samples")
+    first_ns, last_ns = wheels[0].stamp.captured_ns, wheels[-1].stamp.captured_ns
     known = {t.stamp.captured_ns: t.map_from_base for t in truth if first_ns <= t.stamp.captured_ns <= last_ns}
     poses = _thinned(known, spacing_s)
-    for kind, found in (("wheel samples", len(wheels)), ("reference poses", len(poses))):
-        if found < LEAST_SAMPLES:
-            raise ConfigurationError(f"calibration: {found} {kind} are too few; {LEAST_SAMPLES} are the least")
+    require(len(poses), "reference poses")
     times = np.array([time_ns for time_ns, _ in poses]) * 1e-9
     pose = np.array([(p.x, p.y, p.yaw) for _, p in poses])
     pose[:, 2] = np.unwrap(pose[:, 2])
+    return drive_from(wheels, imu, References(times, pose))
+
+
+def in_order(samples: Iterable[S]) -> list[S]:
+    """Return the samples by capture time, each time once."""
+    return [sample for _, sample in sorted({sample.stamp.captured_ns: sample for sample in samples}.items())]
+
+
+def drive_from(wheels: list[WheelSample], imu: Iterable[ImuSample], references: References) -> Drive:
+    """Return samples as arrays; `wheels` are in order."""
+    imu = in_order(imu)
     return Drive(
         wheel_s=np.array([sample.stamp.captured_ns for sample in wheels]) * 1e-9,
         wheel_rad=np.array([sample.position_rad for sample in wheels]),
         gyro_s=np.array([sample.stamp.captured_ns for sample in imu]) * 1e-9,
         gyro_rad_s=np.array([sample.gyro_rad_s[2] for sample in imu]),
-        references=References(times, pose),
+        references=references,
     )
+
+
+def require(found: int, kind: str) -> None:
+    """Raise ConfigurationError if too few of a kind of sample were found."""
+    if found < LEAST_SAMPLES:
+        raise ConfigurationError(f"calibration: {found} {kind} are too few; {LEAST_SAMPLES} are the least")
 
 
 def ways(references: References) -> F64:

@@ -13,6 +13,8 @@ from runtime.outputs import require_writable
 
 app = typer.Typer(help="Identify what the data sheet does not know, and write it back as YAML.", no_args_is_help=True)
 
+Logs = Annotated[list[Path] | None, typer.Option("--log", metavar="LOG", help="a recording made by trundle run; repeatable")]
+
 
 @app.command("base")
 def base(
@@ -20,16 +22,20 @@ def base(
     output: Annotated[Path, typer.Option(help="the configuration to write, which extends CONFIG")] = Path("calibrated.yaml"),
     changes: Changes = None,
     seed: Seed = 0,
+    log: Logs = None,
+    closure: Annotated[
+        bool, typer.Option("--closure", help="each recording begins and ends on the same mark; drive loops in both senses")
+    ] = False,
     force: Annotated[bool, typer.Option("--force", help="overwrite an existing file")] = False,
 ) -> None:
-    """Drive around slowly (2 m of free floor on every side) and identify wheels, gyro and delays."""
+    """Identify wheels, gyro and delays: by recordings, or driving around slowly (2 m of free floor on every side)."""
     from runtime import calibrate
 
     if output.exists() and not force:
         raise ConfigurationError(f"--output {output} exists already; --force overwrites it")
     require_writable(output, "--output")
-    with console.status("driving"):
-        calibration = calibrate.calibrate(config, tuple(changes or ()), seed)
+    with console.status("reading" if log else "driving"):
+        calibration = calibrate.calibrate(config, tuple(changes or ()), seed, logs=tuple(log or ()), closure=closure)
     console.print(calibrate.table_of(calibration))
     calibrate.write(calibration, config, output)
     console.print(f"written to {output}")

@@ -12,9 +12,11 @@ from drivers.interface.kinematics import OmniThreeWheel, SkidSteer
 from drivers.interface.samples import ImuSample, Stamp, TruthSample
 from drivers.interface.seeds import stream
 from estimators.calibration.base import calibrate_base
+from estimators.calibration.closure import calibrate_loops
 from estimators.calibration.drive import drive_of
 from estimators.calibration.gyro import calibrate_gyro
 from estimators.calibration.identify import Unknown, identify
+from estimators.calibration.loops import loops_of
 from estimators.calibration.wheels import calibrate_wheels, wheel_path
 from estimators.wheel_geometry import TwoSided
 from tests.estimators.scenes import MS, wheels
@@ -28,7 +30,11 @@ ALL_WAYS = [(0.3, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, 0.0, 0.6), (-0.3, 0.0, -0.6)
 NO_STRAFING = [(0.3, 0.0, 0.0), (0.0, 0.0, 0.6), (-0.3, 0.0, 0.0), (0.3, 0.0, -0.5)]
 
 
-def driven(true, twists, *, wheels_late_s=0.0, gyro_late_s=0.0, bias=0.0, scale=1.0, noise=0.0, leg_s=6.0):
+def driven(true, twists, **how):
+    return drive_of(*samples(true, twists, **how))
+
+
+def samples(true, twists, *, wheels_late_s=0.0, gyro_late_s=0.0, bias=0.0, scale=1.0, noise=0.0, leg_s=6.0):
     """Samples of a drive at 100 Hz, each twist fading in and out; what is late bears a later stamp."""
     random = stream(0, "calibration")
     pose, angles = SE2(), np.zeros(true.wheel_count)
@@ -46,7 +52,7 @@ def driven(true, twists, *, wheels_late_s=0.0, gyro_late_s=0.0, bias=0.0, scale=
         imu.append(ImuSample(Stamp(stamp_ns, stamp_ns, index), (0.0, 0.0, said), (0.0, 0.0, 9.81)))
         pose = pose.integrate(twist.vx, twist.vy, twist.wz, STEP_S)
         angles = angles + true.wheel_rates(twist) * STEP_S
-    return drive_of(base, imu, truth)
+    return base, imu, truth
 
 
 def test_every_number_of_an_omni_base_is_found():
@@ -140,3 +146,79 @@ def test_the_path_of_a_circle_is_exact():
     end = SE2().integrate(0.3, 0.0, 0.5, 4.0)
     assert path[-1, 0] == pytest.approx(end.x)
     assert path[-1, 1] == pytest.approx(end.y)
+
+
+def leg(way_m, bearing):
+    """A straight way; its fading halves what its twist would make."""
+    speed = 2.0 * way_m / 6.0
+    return (speed * math.cos(bearing), speed * math.sin(bearing), 0.0)
+
+
+def corner(sense):
+    """A quarter of a turn."""
+    return (0.0, 0.0, sense * math.pi / 6.0)
+
+
+def square_loop(side, sense):
+    """Four sides and four corners in one sense."""
+    return [leg(side, 0.0), corner(sense)] * 4
+
+
+def there_and_back_otherwise(way_m, sense, bearing):
+    """Out along one bearing, a quarter of a turn, back along another, and on until it is a whole turn."""
+    return [leg(way_m, bearing), corner(sense), leg(way_m, bearing + math.pi - sense * 0.5 * math.pi), *[corner(sense)] * 3]
+
+
+def looped(true, loop, **how):
+    """A loop between two rests."""
+    rest = [(0.0, 0.0, 0.0)]
+    return samples(true, rest + loop + rest, noise=1e-3, **how)[:2]
+
+
+@pytest.mark.parametrize(("true", "nominal"), [(TRUE_OMNI, OMNI), (TRUE_SKID, SKID)])
+def test_loops_in_both_senses_tell_ratios_and_track_but_no_mean_radius(true, nominal):
+    drives = [square_loop(2.0, sense) for sense in (1, -1)]
+    if true is TRUE_OMNI:
+        drives += [there_and_back_otherwise(2.0, sense, bearing) for sense in (1, -1) for bearing in (0.0, 0.5 * math.pi)]
+    loops = [loop for drive in drives for loop in loops_of(*looped(true, drive, bias=0.004, scale=1.02), nominal)]
+    calibration = calibrate_loops(loops, nominal)
+    assert len(loops) == len(drives)
+    assert calibration.after.end_m < 0.1 * calibration.before.end_m
+    assert calibration.after.end_rad < 0.1 * calibration.before.end_rad
+    assert any("mean" in name for name in calibration.held)
+    geometry = calibration.wheels.geometry
+    if isinstance(nominal, SkidSteer):
+        assert geometry.left_radius_m / geometry.right_radius_m == pytest.approx(0.099 / 0.0975, rel=1e-3)
+        assert geometry.left_radius_m + geometry.right_radius_m == pytest.approx(2 * 0.098)
+        scale = geometry.right_radius_m / 0.0975
+        assert geometry.effective_track_m / scale == pytest.approx(0.57, rel=5e-3)
+    else:
+        ratio = np.divide(geometry.wheel_radius_m, TRUE_OMNI.wheel_radius_m)
+        assert np.ptp(ratio) < 3e-3
+        assert np.sum(geometry.wheel_radius_m) == pytest.approx(0.15)
+    assert calibration.gyro.bias_rad_s == pytest.approx(0.004, abs=3e-4)
+    assert calibration.gyro.scale == pytest.approx(1.02, abs=2e-3)
+
+
+def test_loops_to_one_side_and_loops_that_do_not_close_are_refused():
+    left = loops_of(*looped(TRUE_SKID, square_loop(2.0, 1)), SKID)
+    with pytest.raises(ConfigurationError, match="one sense"):
+        calibrate_loops(left * 2, SKID)
+    open_end = loops_of(*samples(TRUE_SKID, [*square_loop(2.0, -1), (0.2, 0.0, 0.0)])[:2], SKID)
+    with pytest.raises(ConfigurationError, match="would close"):
+        calibrate_loops([*left, *open_end], SKID)
+
+
+def test_loops_that_an_omni_base_drives_forwards_only_are_refused_by_name():
+    loops = [loop for sense in (1, -1) for loop in loops_of(*looped(TRUE_OMNI, square_loop(2.0, sense)), OMNI)]
+    with pytest.raises(ConfigurationError, match=r"do not determine '(wheel_radius|heading_error)"):
+        calibrate_loops(loops, OMNI)
+
+
+def test_one_recording_is_cut_where_the_base_stands_on_the_mark():
+    rest = [(0.0, 0.0, 0.0)]
+    legs = rest + square_loop(2.0, 1) + rest + square_loop(2.0, -1) + rest
+    base, imu, _ = samples(TRUE_SKID, legs)
+    loops = loops_of(base, imu, SKID)
+    assert [round(loop.references.pose[-1, 2] / math.tau) for loop in loops] == [1, -1]
+    assert calibrate_loops(loops, SKID).after.end_m < 0.01

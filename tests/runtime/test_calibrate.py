@@ -1,13 +1,19 @@
 """`trundle calibrate base` from end to end: drives a simulated base, finds its errors, writes what the odometry is to be told."""
 
+import re
+from pathlib import Path
+
 import pytest
 
 from drivers.interface.errors import ConfigurationError
 from runtime import configuration
-from runtime.calibrate import calibrate
+from runtime.assembly import assemble
+from runtime.calibrate import calibrate, odometry_keys
 from runtime.cli import run_command
 from runtime.manoeuvres import calibration_legs, overrides_of
+from runtime.run import RunOptions, run
 
+DRIVE = Path(__file__).parents[1] / "data" / "diff_drive" / "input_excerpt.txt"
 FLOOR = ("robot.camera=null", "world.margin_m=6", "loop.rate_hz=10")
 RADIUS_ERROR, HEADING_ERROR_RAD = (0.02, -0.015, 0.01), (0.026, -0.01, 0.015)
 
@@ -48,3 +54,33 @@ def test_the_manoeuvres_keep_to_the_caps_and_come_back():
         straight = [leg for leg in legs if leg.twist.wz == 0.0]
         assert sum(getattr(leg.twist, axis) * leg.duration_s for leg in straight) == pytest.approx(0.0)
     assert any(text.startswith("mission.time_limit_s=") for text in overrides_of(legs))
+
+
+def test_a_recording_with_truth_gives_what_its_drive_gave(tmp_path, capsys):
+    legs = calibration_legs(assemble(configuration.load("square", FLOOR), 0).robot.devices.base.limits)
+    loaded = configuration.load("square", (*FLOOR, *overrides_of(legs)))
+    log = tmp_path / "drive.rrd"
+    assert run(loaded, RunOptions(seed=3, log=log)).report.outcome == "reached"
+    path = tmp_path / "calibrated.yaml"
+    assert run_command(["calibrate", "base", "square", "--log", str(log), "--output", str(path)]) == 0
+    capsys.readouterr()
+    read = configuration.load(str(path)).estimator.settings.odometry
+    driven = odometry_keys(calibrate("square", FLOOR, 3))
+    assert read.geometry.model_dump(mode="json") == driven["geometry"]
+    assert read.gyro_bias_rad_s == driven["gyro_bias_rad_s"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["square", "--closure"], "--log"),
+        (["square", "--log", "a.rrd", "--log", "b.rrd"], "--closure"),
+        (["square", "--log", "none.rrd"], "none.rrd"),
+        (["recorded_drive", "--set", f"robot.base.path={DRIVE}"], "--closure"),
+        (["recorded_drive", "--closure", "--set", f"robot.base.path={DRIVE}"], "would close|one sense"),
+    ],
+)
+def test_what_is_no_reference_is_refused(tmp_path, capsys, arguments, said):
+    assert run_command(["calibrate", "base", *arguments, "--output", str(tmp_path / "c.yaml")]) == 2
+    assert re.search(said, " ".join(capsys.readouterr().err.split()))
+    assert not (tmp_path / "c.yaml").exists()
