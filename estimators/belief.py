@@ -80,6 +80,18 @@ class Track:
     covariance: F64  # (4, 4): x, y [m], vx, vy [m/s]
 
 
+@dataclass(frozen=True, slots=True)
+class Registration:
+    """What the newest frame, laid on the map, gave; along `undetermined` it gave nothing, as along a corridor."""
+
+    captured_ns: int
+    points: int  # of the frame that lay on what the map knows
+    residual_m: float  # RMS of their distances
+    correction: SE2  # of the pose expected from odometry: x, y along map, yaw
+    covariance: F64  # (3, 3) of map_from_base then: x, y [m], yaw [rad]
+    undetermined: F64  # (k, 3), orthonormal directions of x, y [m] in map and yaw [rad]; all three where nothing matched
+
+
 class EstimatorFault(enum.Enum):
     """What an estimator finds wrong with itself or with what it was given."""
 
@@ -103,6 +115,7 @@ class Belief:
     joints: JointSample | None
     oldest_input_ns: int  # capture time of the oldest among each device's newest samples
     faults: tuple[EstimatorFault, ...] = ()
+    registration: Registration | None = None  # None: it is off, or no frame came yet
 
     @property
     def map_from_base(self) -> SE2:

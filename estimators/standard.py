@@ -22,6 +22,8 @@ from estimators.labelling import FrameLabels, FrameSource
 from estimators.memory import MemorySettings, memory_of
 from estimators.odometry import Odometry, OdometryEstimate, latest_valid_ns
 from estimators.odometry_choice import OdometrySettings, build_odometry
+from estimators.registration import ScanRegistration, SurfaceSource
+from estimators.registration_settings import RegistrationSettings
 from estimators.scan_grid import ScanGrid, ScanGridSettings
 from estimators.tracking_settings import TrackingSettings
 from estimators.truth_odometry import TruthOdometry
@@ -44,6 +46,7 @@ class StandardSettings(Settings):
     memory: MemorySettings = MemorySettings()
     clearance: ClearanceSettings = ClearanceSettings()
     tracking: TrackingSettings = TrackingSettings()
+    registration: RegistrationSettings = RegistrationSettings()
 
 
 class StandardEstimator:
@@ -67,6 +70,7 @@ class StandardEstimator:
         self._memory = memory_of(settings.memory, settings.cell_m, setup.robot_radius_m)
         self._clearance = ClearanceEstimator(settings.clearance)
         self._tracker = _tracker_of(settings)
+        self._registration = _registration_of(settings, setup)
         self._grid = self._memory.grid
         self._frame_ns: int | None = None  # capture time of the newest frame used
         self._joints: JointSample | None = None
@@ -77,6 +81,8 @@ class StandardEstimator:
         self._source.warm_up()
         if self._tracker is not None:
             self._tracker.warm_up()
+        if self._registration is not None:
+            self._registration.warm_up()
         spare = memory_of(self._settings.memory, self._settings.cell_m, self._setup.robot_radius_m)
         spare.merge(FrameLabels(spare.grid, spare.grid.label == FREE), 0, SE2())
 
@@ -110,7 +116,13 @@ class StandardEstimator:
         self._refresh(captured_ns)
         if self._tracker is not None:
             self._tracker.update(frame, self._memory.remembered, captured_ns)
+        if self._registration is not None:
+            self._registration.update(sensed, pose, self._memory.remembered, captured_ns)
         return True
+
+    @property
+    def _map_from_odom(self) -> SE2:
+        return self._setup.map_from_start if self._registration is None else self._registration.map_from_odom
 
     def _refresh(self, stamp_ns: int) -> None:
         self._grid = self._memory.grid
@@ -126,7 +138,7 @@ class StandardEstimator:
             tick=sensed.tick.index,
             stamp_ns=stamp_ns,
             odom_from_base=odometry.odom_from_base,
-            map_from_odom=self._setup.map_from_start,
+            map_from_odom=self._map_from_odom,
             twist=odometry.twist,
             covariance=odometry.covariance,
             grid=self._grid,
@@ -135,6 +147,7 @@ class StandardEstimator:
             joints=self._joints,
             oldest_input_ns=min((captured_ns for captured_ns in captures if captured_ns is not None), default=stamp_ns),
             faults=odometry.faults if valid or odometry.faults else (EstimatorFault.INVALID_INPUT,),
+            registration=None if self._registration is None else self._registration.latest,
         )
 
     def _tracks(self, sensed: Sensed) -> tuple[Track, ...]:
@@ -142,7 +155,7 @@ class StandardEstimator:
             return self._tracker.tracks_at(sensed.tick.start_ns)
         if self._settings.tracks == "none" or sensed.truth is None:
             return ()
-        return tracks_from_truth(sensed.truth, self._setup.map_from_start.inverse())
+        return tracks_from_truth(sensed.truth, self._map_from_odom.inverse())
 
     def snapshot(self) -> bytes:
         """Return the whole state."""
@@ -152,6 +165,7 @@ class StandardEstimator:
             memory=np.frombuffer(self._memory.snapshot(), dtype=np.uint8),
             clearance=np.frombuffer(self._clearance.snapshot(), dtype=np.uint8),
             tracker=np.frombuffer(b"" if self._tracker is None else self._tracker.snapshot(), dtype=np.uint8),
+            registration=np.frombuffer(b"" if self._registration is None else self._registration.snapshot(), dtype=np.uint8),
             frame_ns=np.array([] if self._frame_ns is None else [self._frame_ns], dtype=np.int64),
             joints=pack_joints(self._joints),
         )
@@ -166,6 +180,8 @@ class StandardEstimator:
         self._clearance.restore(state["clearance"].tobytes())
         if self._tracker is not None:
             self._tracker.restore(state["tracker"].tobytes())
+        if self._registration is not None:
+            self._registration.restore(state["registration"].tobytes())
         self._grid = self._memory.grid
         self._frame_ns = int(state["frame_ns"][0]) if state["frame_ns"].size else None
         self._joints = unpack_joints(state["joints"])
@@ -177,6 +193,13 @@ def _tracker_of(settings: StandardSettings) -> GridTracker | None:
     from estimators.tracking import GridTracker  # noqa: PLC0415 - FilterPy brings 40 MB that only those who filter need carry
 
     return GridTracker(settings.tracking)
+
+
+def _registration_of(settings: StandardSettings, setup: EstimatorSetup) -> ScanRegistration | None:
+    if not settings.registration.enabled:
+        return None
+    source = SurfaceSource(settings.source, settings.depth, settings.scan)
+    return ScanRegistration(settings.registration, source, setup.map_from_start)
 
 
 def _odometry_of(settings: StandardSettings, setup: EstimatorSetup) -> Odometry:
