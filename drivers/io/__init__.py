@@ -5,7 +5,7 @@ wire still sends zero.  In ten lines:
 
 1.  Write a `Session` (see `session.py`), built as `MySession(settings, port)`: `open`, `poll(now_ns)`, `rest()`, `close()`,
     `send(values, now_ns)`, `clear_faults()`, and `wakes_on()` / `next_ns(now_ns)`, which say what the process waits for.  It
-    never asks for the time, so a test runs it in its own process: `MySession(settings, local_port(memory))`, driven by a `LastHop`.
+    never asks for the time, so a test runs it in its own process: `MySession(settings, local_port(memory))` under a `LastHop`.
 2.  It delivers through `port.rings["name"].put(record)` and `port.frames["name"].put(meta, pixels)` and tells of itself in
     `port.health` (`received`, `dropped`, `state`, `fault`, `battery_v`, `firmware`, ...); the shell publishes that.
 3.  It raises `DeviceError` or `OSError` when the wire is lost: the shell rests and closes it, says RECONNECTING, and opens it
