@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from drivers.interface.arm_motion import JOINTS, PANDA, TrajectoryFollower
 from drivers.interface.commands import JointLimits, JointTrajectory
 from drivers.interface.devices import DeviceHealth, DeviceSetup, DeviceState
 from drivers.interface.errors import DeviceError
@@ -17,7 +18,6 @@ from drivers.interface.samples import JointSample, Stamp, frozen_array
 from drivers.interface.seeds import stream
 from drivers.interface.settings import Settings
 from sim_drivers.arm_model import LEAD_S, attach_panda, panda_joint
-from sim_drivers.arm_motion import JOINTS, PANDA, TrajectoryFollower
 from sim_drivers.delivery import Delivery
 from sim_drivers.world import SECOND_NS, MujocoWorld, require_world
 

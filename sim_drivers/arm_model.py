@@ -9,7 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from sim_drivers.arm_motion import JOINTS, PANDA
+from drivers.interface.arm_motion import JOINTS, PANDA
 from sim_drivers.mechanics import add_position_servo
 from sim_drivers.world import FLOOR_BIT, OBSTACLE_BIT
 

@@ -5,12 +5,12 @@ from importlib import resources
 import numpy as np
 import pytest
 
+from drivers.interface.arm_motion import PANDA
 from drivers.interface.commands import BodyTwist, JointTrajectory
 from drivers.interface.devices import Arm, DeviceSetup
 from drivers.interface.errors import DeviceError
 from drivers.interface.geometry import SE2
 from sim_drivers.arm import READY_RAD, ArmSettings, SimArm
-from sim_drivers.arm_motion import PANDA
 from sim_drivers.omni_base import OmniBaseSettings, SimOmniBase
 from sim_drivers.scene import Scene
 from sim_drivers.world import MujocoWorld, WorldSettings
