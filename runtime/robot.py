@@ -18,10 +18,11 @@ from drivers.interface.devices import (
     MobileBase,
     Operator,
     RangeScanner,
+    Resettable,
     TruthSource,
 )
 from drivers.interface.errors import DeviceError, TrundleError
-from drivers.interface.samples import OperatorEvent
+from drivers.interface.samples import OperatorEvent, ResetFaults
 from drivers.interface.sensed import Sensed, Tick
 from runtime.mission import MissionTracker
 
@@ -84,6 +85,8 @@ class Robot:
         """Return all samples since the last tick; never blocks, never raises."""
         d = self.devices
         events: tuple[OperatorEvent, ...] = self._ask("operator", d.operator.drain, ()) if d.operator else ()
+        if any(isinstance(event.action, ResetFaults) for event in events):
+            self._clear_faults()
         return Sensed(
             tick=tick,
             depth=self._ask("camera", d.camera.latest, None) if d.camera else None,
@@ -112,6 +115,12 @@ class Robot:
     def close(self) -> None:
         """Close every device, also when one of them fails to.  Raises the first failure, a DeviceError, after all were asked."""
         self._each("close", lambda device: device.close())
+
+    def _clear_faults(self) -> None:
+        """Pass the operator's reset on to every device that latches faults of its own."""
+        for name, device in self._named:
+            if isinstance(device, Resettable):
+                self._ask(name, device.clear_faults, None)
 
     def _ask(self, name: str, question: Callable[[], T], otherwise: T) -> T:
         try:

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar, Protocol, runtime_checkable
 
 from drivers.interface.commands import BaseLimits, BodyTwist, JointLimits, JointTrajectory
 from drivers.interface.kinematics import WheelKinematics
+from drivers.interface.links import Links
 from drivers.interface.samples import (
     BaseSample,
     DepthFrame,
@@ -49,6 +50,19 @@ class DeviceHealth:
     expired_commands: int = 0  # times the dead man at the last hop had to act
     expected_period_ns: int = 0  # 0: the device has no fixed rate
     battery_fraction: float | None = None
+    battery_v: float | None = None
+    bus_load: float | None = None  # share of the wire's bit rate that is in use
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceIdentity:
+    """Who answers at the other end of the wire; what a device does not tell is empty."""
+
+    device: str
+    model: str = ""
+    firmware: str = ""
+    protocol: str = ""
+    serial: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +73,7 @@ class DeviceSetup:
     seed: int
     now_ns: Callable[[], int]
     world: object | None = None
+    links: Links = field(default_factory=Links)  # what the devices of one robot share
 
 
 @runtime_checkable
@@ -87,6 +102,27 @@ class Device(Protocol):
 
     def health(self) -> DeviceHealth:
         """Say how it stands; never blocks, never raises."""
+        ...
+
+
+@runtime_checkable
+class Resettable(Protocol):
+    """A device that latches faults of its own, which the operator's reset is to clear."""
+
+    def clear_faults(self) -> None:
+        """Ask the device to clear its faults and be ready to move; never blocks.
+
+        Until it is known what came of it, `health` says RECONNECTING: a fault would latch again in the tick of the reset.
+        """
+        ...
+
+
+@runtime_checkable
+class Identified(Protocol):
+    """A device that knows who answers at the other end of its wire."""
+
+    def identity(self) -> DeviceIdentity:
+        """Return what it has told of itself so far; never blocks, never raises."""
         ...
 
 

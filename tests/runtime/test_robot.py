@@ -9,7 +9,7 @@ from drivers.interface.devices import DeviceHealth, DeviceState
 from drivers.interface.errors import DeviceError
 from drivers.interface.geometry import SE2
 from drivers.interface.mission import Goal, Mission
-from drivers.interface.samples import NewGoal, OperatorEvent, Stamp
+from drivers.interface.samples import NewGoal, OperatorEvent, ResetFaults, Stamp
 from drivers.interface.sensed import Tick
 from runtime.mission import MissionTracker
 from runtime.robot import Devices, Robot
@@ -121,3 +121,37 @@ def test_only_what_is_commanded_is_written() -> None:
     bundle.write(Command(None, None, 5, 0))
     bundle.write(Command(BodyTwist(0.5, 0, 0), None, 7, 0))
     assert diary == ["base command 0.5 until 7"]
+
+
+class Latching(Fake):
+    """A device that latches its own fault until it is reset."""
+
+    fault = "axis 2 has tripped"
+
+    def clear_faults(self) -> None:
+        self._do("clear_faults")
+        self.fault = ""
+
+    def health(self) -> DeviceHealth:
+        return DeviceHealth(self.name, DeviceState.FAULTED if self.fault else DeviceState.OPEN, self.fault)
+
+
+class Resetting(Fake):
+    asks = False
+
+    def drain(self) -> tuple[OperatorEvent, ...]:
+        return (OperatorEvent(Stamp(0, 0, 0), ResetFaults()),) if self.asks else ()
+
+
+def test_the_operators_reset_reaches_the_devices_before_they_say_how_they_stand() -> None:
+    diary: list[str] = []
+    base, camera = Latching("base", diary), Latching("camera", diary, "clear_faults")
+    operator = Resetting("operator", diary)
+    devices = Devices(base=base, camera=camera, imu=Fake("imu", diary), operator=operator)
+    robot = Robot(devices, MissionTracker(Mission(SE2(), ())))
+    assert {h.device: h.state for h in robot.read(Tick(0, 0, 1)).health}["base"] is DeviceState.FAULTED
+    operator.asks = True
+    health = {h.device: h for h in robot.read(Tick(1, 1, 1)).health}
+    assert health["base"].state is DeviceState.OPEN
+    assert health["camera"].fault == "camera cannot clear_faults"
+    assert diary == ["camera clear_faults", "base clear_faults"]
