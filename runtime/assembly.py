@@ -9,6 +9,7 @@ from drivers.interface.clock import Clock, PacedClock, RealClock, SimClock
 from drivers.interface.devices import DeviceSetup, WorldElsewhere
 from drivers.interface.errors import ConfigurationError
 from drivers.interface.geometry import SE2
+from drivers.interface.links import Links
 from drivers.interface.mission import Goal, Mission
 from estimators.estimator import Estimator, EstimatorSetup
 from planners.planner import Planner, PlannerSetup
@@ -140,8 +141,9 @@ def _devices(configuration: Configuration, seed: int, world: MujocoWorld | None)
         return clocks[0].now_ns()
 
     built: dict[str, Any] = {}
+    links = Links()
     for name, choice in configuration.devices:
-        built[name] = choice.build(DeviceSetup(name, seed, now_ns, world))
+        built[name] = choice.build(DeviceSetup(name, seed, now_ns, world, links))
     # A driver that lives in real time (a device, a keyboard) says so with a class attribute.
     live = [name for name, choice in configuration.devices if getattr(choice.cls, "real_time", False)]
     realtime = configuration.loop.realtime or bool(live) or configuration.emulation is not None
