@@ -8,10 +8,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.table import Table
 
 from runtime.cycle import STAGES
+from runtime.durations import Durations
 from runtime.outputs import write_text
 
 
@@ -107,20 +107,13 @@ class RunReport:
         return table
 
 
-def stage_times(history_ns: NDArray[np.int64]) -> dict[str, StageTime]:
-    """Return the statistics of every stage from its durations [ns], shape (ticks, stages)."""
-    if len(history_ns) == 0:
+def stage_times(durations: Durations) -> dict[str, StageTime]:
+    """Return the statistics of every stage."""
+    if not len(durations):
         return {}
-    ms = history_ns * 1e-6
-    return {
-        stage: StageTime(
-            float(ms[:, i].mean()),
-            float(np.percentile(ms[:, i], 50)),
-            float(np.percentile(ms[:, i], 99)),
-            float(ms[:, i].max()),
-        )
-        for i, stage in enumerate(STAGES)
-    }
+    figures = (durations.mean_ns, durations.percentile_ns(50.0), durations.percentile_ns(99.0), durations.max_ns)
+    ms = np.stack(figures, axis=1) * 1e-6  # (stages, 4)
+    return {stage: StageTime(*row) for stage, row in zip(STAGES, ms.tolist(), strict=True)}
 
 
 def finite_or_none(value: float) -> float | None:

@@ -157,7 +157,7 @@ class _Run:
             duration_s=tally.duration_s,
             odometry_error_m=finite_or_none(tally.odometry_error_m),
             odometry_error_rad=finite_or_none(tally.odometry_error_rad),
-            stage_ms=stage_times(self._stopwatch.history_ns),
+            stage_ms=stage_times(self._stopwatch.durations),
             faults=tuple(
                 FaultCount(fault.value, count.ticks, count.first_tick, device, count.first.detail)
                 for (fault, device), count in tally.faults.items()

@@ -7,10 +7,8 @@ import time
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from runtime.cycle import STAGES
+from runtime.durations import Durations
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -22,7 +20,7 @@ class Stopwatch:
     def __init__(self) -> None:
         """Start with no tick."""
         self._now = [0] * len(STAGES)
-        self._history: list[tuple[int, ...]] = []
+        self.durations = Durations(len(STAGES))  # of every tick, in the order of STAGES
 
     def timed(self, stage: str, call: Callable[P, R]) -> Callable[P, R]:
         """Return the call with its duration counted towards a stage."""
@@ -47,10 +45,5 @@ class Stopwatch:
         return self._now[STAGES.index("plan")]
 
     def tick_over(self) -> None:
-        """Keep this tick's durations."""
-        self._history.append(tuple(self._now))
-
-    @property
-    def history_ns(self) -> NDArray[np.int64]:
-        """Every tick's durations [ns], shape (ticks, stages)."""
-        return np.array(self._history, dtype=np.int64).reshape(-1, len(STAGES))
+        """Count this tick's durations."""
+        self.durations.add(tuple(self._now))
