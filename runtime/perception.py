@@ -15,7 +15,9 @@ from drivers.interface.samples import DepthFrame, ObstacleTruth, TruthSample
 from estimators.belief import Belief, Track
 from estimators.standard import StandardSettings
 from runtime import configuration
+from runtime.assembly import Assembly
 from runtime.cycle import Cycle
+from runtime.grid_score import GridFigures, GridScore
 from runtime.run import RunOptions, run
 
 F64 = NDArray[np.float64]
@@ -35,6 +37,7 @@ class PerceptionFigures:
     velocity_rms_m_s: float
     switches: int  # an obstacle's track was another one than before
     phantoms_per_tick: float  # tracks near no obstacle
+    false_tracks: int  # tracks that were near no obstacle as long as they lived
 
 
 class TrackScore:
@@ -48,6 +51,8 @@ class TrackScore:
         self._identity: dict[str, int] = {}
         self._errors: list[tuple[float, float]] = []  # position [m], velocity [m/s]
         self._ticks = self._missed = self._switches = self._phantoms = 0
+        self._born: set[int] = set()  # identities; only counted
+        self._true: set[int] = set()
 
     def hear(self, cycle: Cycle) -> None:
         """Score one tick."""
@@ -59,15 +64,18 @@ class TrackScore:
         offsets = np.array([_errors(obstacle, truth, track, cycle.belief) for obstacle in truth.obstacles for track in tracks])
         offsets = offsets.reshape(len(truth.obstacles), len(tracks), 2)
         pairs = _matched(offsets[:, :, 0])
-        self._phantoms += int((offsets[:, :, 0] > MATCH_M).all(axis=0).sum())
+        of_nothing = np.all(offsets[:, :, 0] > MATCH_M, axis=0)  # (tracks,)
+        self._phantoms += int(of_nothing.sum())
+        self._born.update(track.identity for track in tracks)
+        self._true.update(track.identity for track, stray in zip(tracks, of_nothing.tolist(), strict=True) if not stray)
         for index, obstacle in enumerate(truth.obstacles):
             if self._counts(obstacle, truth, self._frame):
-                self._score(obstacle.name, tracks[pairs[index]] if index in pairs else None, offsets[index, pairs.get(index, 0)])
+                if index in pairs:
+                    self._score(obstacle.name, tracks[pairs[index]], offsets[index, pairs[index]])
+                else:
+                    self._missed += 1
 
-    def _score(self, name: str, track: Track | None, errors: F64) -> None:
-        if track is None:
-            self._missed += 1
-            return
+    def _score(self, name: str, track: Track, errors: F64) -> None:
         self._errors.append((float(errors[0]), float(errors[1])))
         self._switches += self._identity.get(name, track.identity) != track.identity
         self._identity[name] = track.identity
@@ -87,14 +95,23 @@ class TrackScore:
         position, velocity = (float(np.sqrt(np.mean(squares))) if squares.size else math.nan for squares in np.square(errors).T)
         phantoms = self._phantoms / max(self._ticks, 1)
         looks = len(errors) + self._missed
-        return PerceptionFigures(looks, self._missed, position, velocity, self._switches, phantoms)
+        false = len(self._born - self._true)
+        return PerceptionFigures(looks, self._missed, position, velocity, self._switches, phantoms, false)
 
 
-def perception(name_or_path: str, seed: int, overrides: tuple[str, ...] = ()) -> PerceptionFigures:
-    """Run a configuration with tracks from the grid and return how good they were.
+@dataclass(frozen=True, slots=True)
+class Perceived:
+    """What came of one run."""
+
+    tracks: PerceptionFigures
+    grid: GridFigures
+
+
+def perception(name_or_path: str, seed: int, overrides: tuple[str, ...] = ()) -> Perceived:
+    """Run a simulated configuration with tracks from the grid and return how good they and the grid were.
 
     Raises:
-        ConfigurationError: the configuration is wrong, or its estimator makes no grid from depth.
+        ConfigurationError: the configuration is wrong, has no world, or its estimator makes no grid from depth.
     """
     loaded = configuration.load(name_or_path, ("estimator.tracks=grid", *overrides))
     settings = loaded.estimator.settings
@@ -102,11 +119,23 @@ def perception(name_or_path: str, seed: int, overrides: tuple[str, ...] = ()) ->
         raise ConfigurationError(
             f"{name_or_path}: estimator.name '{loaded.estimator.name}': tracks are judged for 'standard' only"
         )
-    score = TrackScore(settings.depth.range_max_m)
-    result = run(loaded, RunOptions(seed=seed, progress=score.hear))
+    if loaded.world is None:
+        raise ConfigurationError(f"{name_or_path}: without a world there is no truth to judge perception by")
+    tracks = TrackScore(settings.depth.range_max_m)
+    grids: list[GridScore] = []
+
+    def ready(assembly: Assembly) -> None:
+        assert assembly.scene is not None  # there is a world
+        grids.append(GridScore(assembly.scene, settings.depth.range_max_m))
+
+    def progress(cycle: Cycle) -> None:
+        tracks.hear(cycle)
+        grids[0].hear(cycle)
+
+    result = run(loaded, RunOptions(seed=seed, progress=progress, ready=ready))
     if result.failure is not None:
         raise result.failure
-    return score.figures
+    return Perceived(tracks.figures, grids[0].figures)
 
 
 def _errors(obstacle: ObstacleTruth, truth: TruthSample, track: Track, belief: Belief) -> tuple[float, float]:

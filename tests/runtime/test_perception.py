@@ -8,7 +8,7 @@ from runtime.perception import _matched, perception
 
 @pytest.mark.parametrize(("memory", "seed"), [("rolling", 0), ("layers", 1)])
 def test_walkers_in_the_hallway_are_tracked(memory, seed):
-    figures = perception("dynamic_hallway", seed, ("world.walkers=3", f"estimator.memory.kind={memory}"))
+    figures = perception("dynamic_hallway", seed, ("world.walkers=3", f"estimator.memory.kind={memory}")).tracks
     assert figures.looks > 15
     assert figures.missed <= 0.02 * figures.looks
     assert figures.position_rms_m <= 0.12
