@@ -8,7 +8,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
 from rich.table import Table
 
 from drivers.interface.errors import ConfigurationError
@@ -21,6 +20,7 @@ from estimators.calibration.drive import drive_of
 from estimators.calibration.loops import loops_of
 from runtime import configuration
 from runtime.assembly import assemble
+from runtime.calibration_file import write_extension
 from runtime.manoeuvres import calibration_legs, driven, observed
 from runtime.recorded_samples import recorded
 
@@ -126,11 +126,7 @@ def write(calibration: BaseCalibration, config: str, path: Path) -> None:
     Raises:
         ConfigurationError: the file cannot be written.
     """
-    content = {"extends": config, "estimator": {"odometry": odometry_keys(calibration)}}
-    try:
-        path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
-    except OSError as error:
-        raise ConfigurationError(f"--output {path} cannot be written: {error.strerror}") from error
+    write_extension(config, {"estimator": {"odometry": odometry_keys(calibration)}}, path)
 
 
 def table_of(calibration: BaseCalibration) -> Table:

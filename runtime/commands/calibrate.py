@@ -39,3 +39,25 @@ def base(
     console.print(calibrate.table_of(calibration))
     calibrate.write(calibration, config, output)
     console.print(f"written to {output}")
+
+
+@app.command("camera")
+def camera(
+    config: Config,
+    output: Annotated[Path, typer.Option(help="the configuration to write, which extends CONFIG")] = Path("calibrated.yaml"),
+    changes: Changes = None,
+    seed: Seed = 0,
+    log: Annotated[Path | None, typer.Option("--log", metavar="LOG", help="a recording made by trundle run")] = None,
+    force: Annotated[bool, typer.Option("--force", help="overwrite an existing file")] = False,
+) -> None:
+    """Identify the camera's height, pitch and roll from the floor in front of the robot, which stands."""
+    from runtime import calibrate_camera
+
+    if output.exists() and not force:
+        raise ConfigurationError(f"--output {output} exists already; --force overwrites it")
+    require_writable(output, "--output")
+    with console.status("looking"):
+        calibration = calibrate_camera.calibrate(config, tuple(changes or ()), seed, log)
+    console.print(calibrate_camera.table_of(calibration))
+    calibrate_camera.write(calibration, config, tuple(changes or ()), output)
+    console.print(f"written to {output}")

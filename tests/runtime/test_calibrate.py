@@ -84,3 +84,38 @@ def test_what_is_no_reference_is_refused(tmp_path, capsys, arguments, said):
     assert run_command(["calibrate", "base", *arguments, "--output", str(tmp_path / "c.yaml")]) == 2
     assert re.search(said, " ".join(capsys.readouterr().err.split()))
     assert not (tmp_path / "c.yaml").exists()
+
+
+@pytest.mark.parametrize("robot", ["xlerobot", "jackal"])
+def test_a_camera_is_calibrated_standing_and_the_file_can_be_run(tmp_path, capsys, robot):
+    path, pitch_rad, roll_rad = tmp_path / "camera.yaml", 0.08, -0.02
+    tilt = [f"robot={robot}", f"robot.camera.pitch_rad={pitch_rad}", f"robot.camera.roll_rad={roll_rad}"]
+    arguments = ["calibrate", "camera", "long_corridor", "--output", str(path)]
+    assert run_command([*arguments, *sets(tilt)]) == 0
+    assert "ground about its plane" in capsys.readouterr().out
+    loaded = configuration.load(str(path))
+    camera = dict(loaded.devices)["camera"].settings
+    assert loaded.robot.name == robot
+    assert camera.pitch_rad == pytest.approx(pitch_rad, abs=0.003)
+    assert camera.roll_rad == pytest.approx(roll_rad, abs=0.003)
+    assert camera.z_m == pytest.approx(
+        dict(configuration.load("long_corridor", (tilt[0],)).devices)["camera"].settings.z_m, abs=0.005
+    )
+
+
+def test_a_recorded_camera_is_calibrated_by_the_frames_it_took_standing(tmp_path):
+    log, path = tmp_path / "stood.rrd", tmp_path / "camera.yaml"
+    loaded = configuration.load("long_corridor", ("robot.camera.pitch_rad=0.1", "planner.name=idle", "mission.time_limit_s=2"))
+    run(loaded, RunOptions(log=log))
+    assert run_command(["calibrate", "camera", "long_corridor", "--log", str(log), "--output", str(path)]) == 0
+    assert dict(configuration.load(str(path)).devices)["camera"].settings.pitch_rad == pytest.approx(0.1, abs=0.003)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"), [("robot.camera=null", "robot.camera"), ("robot.camera.pitch_rad=-0.6", "no ground is visible")]
+)
+def test_a_camera_that_sees_no_ground_or_is_not_there_is_refused(tmp_path, capsys, change, said):
+    path = tmp_path / "camera.yaml"
+    assert run_command(["calibrate", "camera", "long_corridor", "--set", change, "--output", str(path)]) == 2
+    assert said in " ".join(capsys.readouterr().err.split())
+    assert not path.exists()
