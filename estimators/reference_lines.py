@@ -6,6 +6,8 @@ keeps the direction that its first metres gave it.  Their number is bounded: the
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,17 +17,32 @@ from estimators.straight_pieces import StraightPieces
 
 KNOWN_SHARE = 0.5  # of a piece's points on one line: it is a part of that
 NEW_SHARE = 0.1  # of them on any line at most: it is a line of its own
+MOVED = 0.5  # mean square of the distances from a line that is not trusted yet, over the noise's: it does not stand still
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """The straight pieces of a frame, and how they lie on the lines."""
+
+    pieces: StraightPieces  # with points in map; their directions are not looked at
+    noise_m: F64  # (n,), standard deviation of each point
+    deviation_m: F64  # (n,), how far from a line it may lie to be a part of it
+    line: NDArray[np.int64]  # (n,), on which line each point was found, negative for none
 
 
 class ReferenceLines:
     """A table of lines; empty rows have no ends apart."""
 
     def __init__(self, capacity: int, trusted_after: int) -> None:
-        """Start with none; a line may move the pose once it was seen in `trusted_after` frames."""
+        """Start with none; a line may move the pose once `trusted_after` frames in a row found it in its place.
+
+        Those of the first frame may at once: where they lie is what the map is.
+        """
         self._trusted_after = trusted_after
         self._moments = np.zeros((capacity, 6))  # weight, mean x, mean y, scatter xx, xy, yy
         self._ends = np.zeros((capacity, 4))
         self._sightings = np.zeros(capacity, dtype=np.int64)
+        self._trusted = np.zeros(capacity, dtype=np.bool_)
         self._seen = np.zeros(capacity, dtype=np.int64)  # the number of the frame that saw it last
         self._count = 0
         self._normal, self._offset = np.zeros((capacity, 2)), np.zeros(capacity)
@@ -52,31 +69,41 @@ class ReferenceLines:
     @property
     def trusted(self) -> Mask:
         """Which of them may move the pose, shape (lines,)."""
-        return np.asarray(self._sightings[: self._count] >= self._trusted_after)
+        return self._trusted[: self._count]
 
-    def learn(self, found: StraightPieces, noise_m: F64, line: NDArray[np.int64], frame: int, settle_frames: int | None) -> None:
-        """Take the pieces of a frame, with points in map, into the lines they lie on, or as new lines.
+    def learn(self, seen: Sighting, frame: int, settle_frames: int | None) -> None:
+        """Take the pieces of a frame into the lines they lie on, or as new lines.
 
         Args:
-            found: the pieces; their directions are not looked at.
-            noise_m: standard deviation of each point, shape (n,).
-            line: on which line each point lies, negative for none, shape (n,).
+            seen: the pieces.
             frame: the frame's number.
             settle_frames: lines seen in more frames than this stay as they are; None: none does.
         """
-        for index in range(len(found.direction)):
-            mine = found.piece == index
-            on = line[mine]
-            known = on[on >= 0]
-            if len(known) >= KNOWN_SHARE * len(on):
-                best = int(np.bincount(known).argmax())
-                self._seen[best] = frame
-                if settle_frames is None or self._sightings[best] < settle_frames:
-                    self._take(best, found.points[mine], noise_m[mine])
-            elif len(known) <= NEW_SHARE * len(on):
-                best = self._free_row()
-                self._moments[best], self._sightings[best], self._seen[best] = 0.0, 0, frame
-                self._take(best, found.points[mine], noise_m[mine])
+        first = self._count == 0
+        for index in range(len(seen.pieces.direction)):
+            mine = seen.pieces.piece == index
+            known = seen.line[mine & (seen.line >= 0)]
+            size = np.count_nonzero(mine)
+            if len(known) >= KNOWN_SHARE * size:
+                self._see_again(int(np.bincount(known).argmax()), seen, mine, frame, settle_frames)
+            elif len(known) <= NEW_SHARE * size:
+                row = self._free_row()
+                self._trusted[row] = first
+                self._begin(row, seen, mine, frame)
+
+    def _see_again(self, row: int, seen: Sighting, mine: Mask, frame: int, settle_frames: int | None) -> None:
+        apart_m = np.abs(seen.pieces.points @ self._normal[row] - self._offset[row])
+        self._seen[row] = frame
+        if not self._trusted[row] and float(np.mean((apart_m[mine] / seen.noise_m[mine]) ** 2)) > MOVED:
+            self._begin(row, seen, mine, frame)
+        elif settle_frames is None or self._sightings[row] < settle_frames:
+            mine = mine & (apart_m <= seen.deviation_m)
+            self._take(row, seen.pieces.points[mine], seen.noise_m[mine])
+            self._trusted[row] |= self._sightings[row] >= self._trusted_after
+
+    def _begin(self, row: int, seen: Sighting, mine: Mask, frame: int) -> None:
+        self._moments[row], self._sightings[row], self._seen[row] = 0.0, 0, frame
+        self._take(row, seen.pieces.points[mine], seen.noise_m[mine])
 
     def _free_row(self) -> int:
         if self._count < len(self._moments):
@@ -86,6 +113,8 @@ class ReferenceLines:
 
     def _take(self, row: int, points: F64, noise_m: F64) -> None:
         """Add points, shape (n, 2), to a line's moments and say anew where it lies."""
+        if len(points) == 0:
+            return
         weights = 1.0 / noise_m**2
         weight, mean = float(weights.sum()), np.average(points, axis=0, weights=weights)
         apart = points - mean
@@ -118,6 +147,7 @@ class ReferenceLines:
             moments=self._moments[:count],
             ends=self._ends[:count],
             sightings=self._sightings[:count],
+            trusted=self.trusted,
             seen=self._seen[:count],
             normal=self.normal,
             offset=self.offset,
@@ -129,4 +159,5 @@ class ReferenceLines:
         self._count = count = len(state["offset"])
         self._moments[:count], self._ends[:count] = state["moments"], state["ends"]
         self._sightings[:count], self._seen[:count] = state["sightings"], state["seen"]
+        self._trusted[:count] = state["trusted"]
         self._normal[:count], self._offset[:count] = state["normal"], state["offset"]

@@ -34,13 +34,13 @@ from drivers.interface.sensed import Sensed
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import F64, Registration
 from estimators.depth_grid import DepthGridSettings
-from estimators.reference_lines import ReferenceLines
+from estimators.reference_lines import ReferenceLines, Sighting
 from estimators.registration_settings import RegistrationSettings
 from estimators.remembered import Remembered
 from estimators.scan_alignment import Alignment, Expected, align
 from estimators.scan_grid import ScanGridSettings
 from estimators.slab_points import points_of_depth, points_of_scan
-from estimators.straight_pieces import StraightPieces, straight_pieces
+from estimators.straight_pieces import straight_pieces
 
 START_STD = np.array([1e-3, 1e-3, 1e-3])  # m, m, rad: the map is where the robot says that it starts
 
@@ -90,7 +90,7 @@ class ScanRegistration:
         wall = np.stack((np.linspace(1.0, 3.0, 40), np.ones(40)), axis=-1)
         self._source.warm_up()
         spare = ScanRegistration(self._settings, self._source, SE2())
-        for stamp_ns in range(self._settings.trusted_after + 1):
+        for stamp_ns in range(2):
             spare.register(wall, SE2(), stamp_ns)
 
     def update(self, sensed: Sensed, odom_from_base: SE2, remembered: Remembered, captured_ns: int) -> None:
@@ -104,10 +104,9 @@ class ScanRegistration:
     def register(self, surface: F64, odom_from_base: SE2, captured_ns: int) -> None:
         """Take in the static surface in base, shape (n, 2) [m], neighbours next to each other."""
         settings = self._settings
-        found = straight_pieces(
-            surface, settings.piece_gap_m, settings.piece_deviation_m, settings.piece_min_m, settings.piece_points_min
-        )
         noise_m = settings.noise_floor_m + settings.noise_per_m * (surface**2).sum(axis=1)
+        deviation_m = settings.piece_deviation_m + noise_m
+        found = straight_pieces(surface, deviation_m, settings.piece_gap_m, settings.piece_min_m, settings.piece_points_min)
         expected = self._expected(odom_from_base, captured_ns)
         aligned = align(found, noise_m, expected, self._lines, settings)
         pose = SE2(*aligned.pose.tolist())
@@ -115,7 +114,7 @@ class ScanRegistration:
         self._covariance, self._odom_from_base, self._frame_ns = aligned.covariance, odom_from_base, captured_ns
         self._frames += 1
         if aligned.believed:
-            self._learn(found, noise_m, aligned.line, pose)
+            self._learn(Sighting(found, noise_m, deviation_m, aligned.line), pose)
         self.latest = _registration(aligned, expected, captured_ns)
 
     def _expected(self, odom_from_base: SE2, captured_ns: int) -> Expected:
@@ -130,13 +129,13 @@ class ScanRegistration:
         spread = turns @ self._covariance @ turns.T + np.diag([place, place, heading])
         return Expected(np.array([pose.x, pose.y, pose.yaw]), spread)
 
-    def _learn(self, found: StraightPieces, noise_m: F64, line: NDArray[np.int64], map_from_base: SE2) -> None:
+    def _learn(self, seen: Sighting, map_from_base: SE2) -> None:
         settings, turned = self._settings, (self._key.inverse() @ map_from_base).yaw
         key = self._key.distance(map_from_base) >= settings.key_m or abs(turned) >= settings.key_rad
         if key:
             self._key = map_from_base
-        in_map = replace(found, points=map_from_base.apply(found.points))
-        self._lines.learn(in_map, noise_m, line, self._frames, None if key else settings.settle_frames)
+        in_map = replace(seen, pieces=replace(seen.pieces, points=map_from_base.apply(seen.pieces.points)))
+        self._lines.learn(in_map, self._frames, None if key else settings.settle_frames)
 
     def snapshot(self) -> bytes:
         """Return the whole state."""

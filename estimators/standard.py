@@ -114,10 +114,13 @@ class StandardEstimator:
         self._memory.merge(frame, captured_ns, pose)
         self._frame_ns = captured_ns
         self._refresh(captured_ns)
+        if self._tracker is None and self._registration is None:
+            return True
+        remembered = self._memory.remembered
         if self._tracker is not None:
-            self._tracker.update(frame, self._memory.remembered, captured_ns)
+            self._tracker.update(frame, remembered, captured_ns)
         if self._registration is not None:
-            self._registration.update(sensed, pose, self._memory.remembered, captured_ns)
+            self._registration.update(sensed, pose, remembered, captured_ns)
         return True
 
     @property

@@ -28,20 +28,20 @@ class StraightPieces:
     direction: F64  # (pieces, 2), unit length
 
 
-def straight_pieces(points: F64, gap_m: float, deviation_m: float, length_min_m: float, points_min: int) -> StraightPieces:
+def straight_pieces(points: F64, deviation_m: F64, gap_m: float, length_min_m: float, points_min: int) -> StraightPieces:
     """Return the pieces among points, shape (n, 2), in the order of their bearing.
 
     Args:
         points: neighbours on the surface are neighbours here.
+        deviation_m: of each point from the line between its piece's ends, shape (n,).
         gap_m: between neighbours that do not hang together.
-        deviation_m: of a point from the line between a piece's ends.
         length_min_m: shorter pieces are none.
         points_min: nor are those with fewer points.
     """
     points = np.ascontiguousarray(points)
     piece = np.full(len(points), NO_PIECE, dtype=np.int64)
     direction = np.empty((len(points), 2))
-    count = _split(points, gap_m, deviation_m, length_min_m, points_min, piece, direction)
+    count = _split(points, deviation_m, gap_m, length_min_m, points_min, piece, direction)
     return StraightPieces(points, piece, direction[:count])
 
 
@@ -51,17 +51,19 @@ def _distance(points: F64, one: int, other: int) -> float:
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _farthest(points: F64, first: int, last: int) -> tuple[int, float, float]:
-    """Return which point between two lies farthest from the line through them, how far, and the two's distance."""
+def _farthest(points: F64, deviation_m: F64, first: int, last: int) -> tuple[int, float, float]:
+    """Return which point between two lies farthest from the line through them beyond its deviation, how far beyond, and the
+    distance of the two.
+    """
     dx, dy = points[last, 0] - points[first, 0], points[last, 1] - points[first, 1]
     length = _distance(points, first, last)
-    index, distance = first, 0.0
+    index, beyond = first, 0.0
     if length > 0.0:
         for i in range(first + 1, last):
             off = abs(dx * (points[i, 1] - points[first, 1]) - dy * (points[i, 0] - points[first, 0])) / length
-            if off > distance:
-                index, distance = i, off
-    return index, distance, length
+            if off - deviation_m[i] > beyond:
+                index, beyond = i, off - deviation_m[i]
+    return index, beyond, length
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -77,7 +79,7 @@ def _principal_direction(points: F64) -> tuple[float, float]:
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _split(
-    points: F64, gap_m: float, deviation_m: float, length_min_m: float, points_min: int, piece: NDArray[Any], direction: F64
+    points: F64, deviation_m: F64, gap_m: float, length_min_m: float, points_min: int, piece: NDArray[Any], direction: F64
 ) -> int:
     """Write each point's piece and each piece's direction; return the number of pieces."""
     found, start = 0, 0
@@ -90,10 +92,10 @@ def _split(
         while depth > 0:
             depth -= 1
             first, last = stack[depth, 0], stack[depth, 1]
-            index, distance, length = _farthest(points, first, last)
+            index, beyond, length = _farthest(points, deviation_m, first, last)
             if last - first + 1 < points_min:
                 continue
-            if distance > deviation_m:
+            if beyond > 0.0:
                 stack[depth, 0], stack[depth, 1] = index, last
                 stack[depth + 1, 0], stack[depth + 1, 1] = first, index
                 depth += 2
