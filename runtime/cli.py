@@ -11,7 +11,8 @@ import typer
 from rich.console import Console
 
 from drivers.interface.errors import ConfigurationError, TrundleError
-from runtime.commands import calibrate
+from runtime.commands import calibrate, log
+from runtime.commands.doctor import doctor
 from runtime.commands.emulate import emulate
 from runtime.commands.evaluate import evaluate
 from runtime.commands.listing import list_
@@ -30,10 +31,12 @@ errors = Console(stderr=True, soft_wrap=True)
 
 app.command()(run)
 app.command()(emulate)
+app.command()(doctor)
 app.command()(evaluate)
 app.command(name="list")(list_)
 app.command()(schema)
 app.add_typer(calibrate.app, name="calibrate")
+app.add_typer(log.app, name="log")
 app.command()(review)
 
 

@@ -1,0 +1,1 @@
+"""`trundle doctor`: what must be known of a machine and its devices before motion is allowed."""
