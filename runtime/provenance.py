@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from drivers.interface.geometry import SE2
+from importlib import resources
+
+from drivers.interface.geometry import SE2, SE3
 from runtime.assembly import Assembly
-from runtime.log.header import RunHeader, SceneShape, code_version, library_versions, machine
+from runtime.configuration import Choice, Configuration
+from runtime.log.header import ArmShape, RunHeader, SceneShape, code_version, library_versions, machine
+from runtime.log.urdf import links_of
 from sim_drivers.scene import Scene, Shape
 
 
@@ -18,6 +22,8 @@ def run_header(assembly: Assembly, seed: int) -> RunHeader:
         planner=configuration.planner.choice.name,
         robot_radius_m=configuration.robot.radius_m,
         robot_height_m=configuration.robot.height_m,
+        devices=tuple(name for name, _ in configuration.devices),
+        arm=_arm(configuration),
         static=() if assembly.scene is None else _static(assembly.scene),
         movers=() if assembly.scene is None else _moving(assembly.scene),
         code_version=version,
@@ -25,6 +31,17 @@ def run_header(assembly: Assembly, seed: int) -> RunHeader:
         libraries=library_versions(),
         machine=machine(),
     )
+
+
+def _arm(configuration: Configuration) -> ArmShape | None:
+    """Return the arm's shape, where its driver names a model; an arm without a mount in its settings stands on the base."""
+    arm: Choice | None = dict(configuration.devices).get("arm")
+    model: str = getattr(arm.cls, "model", "") if arm is not None else ""
+    if arm is None or not model:
+        return None
+    mount = {key: getattr(arm.settings, f"mount_{key}", 0.0) for key in ("x_m", "y_m", "z_m", "yaw_rad")}
+    base_from_foot = SE3.from_euler(mount["x_m"], mount["y_m"], mount["z_m"], 0.0, 0.0, mount["yaw_rad"])
+    return ArmShape(base_from_foot, links_of(resources.files("configs").joinpath(model).read_text(encoding="utf-8")))
 
 
 def _static(scene: Scene) -> tuple[SceneShape, ...]:

@@ -17,7 +17,7 @@ from drivers.interface.errors import DeviceError
 from drivers.interface.samples import JointSample, Stamp, frozen_array
 from drivers.interface.seeds import stream
 from drivers.interface.settings import Settings
-from sim_drivers.arm_model import LEAD_S, attach_panda, panda_joint
+from sim_drivers.arm_model import LEAD_S, MODEL, attach_panda, panda_joint
 from sim_drivers.delivery import Delivery
 from sim_drivers.world import SECOND_NS, MujocoWorld, require_world
 
@@ -49,6 +49,7 @@ class SimArm:
 
     Settings: ClassVar[type[Settings]] = ArmSettings
     role: ClassVar[str] = "arm"
+    model: ClassVar[str] = MODEL
     max_step_s = 0.001
     period_ns = 1_000_000
 

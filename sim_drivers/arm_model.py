@@ -13,6 +13,7 @@ from drivers.interface.arm_motion import JOINTS, PANDA
 from sim_drivers.mechanics import add_position_servo
 from sim_drivers.world import FLOOR_BIT, OBSTACLE_BIT
 
+MODEL = "models/panda.urdf"  # in configs
 STIFFNESS_NM_RAD = np.array([3000.0, 3000.0, 3000.0, 2500.0, 2500.0, 2000.0, 2000.0])  # libfranka's own examples' impedance
 DAMPING_NM_S_RAD = np.array([140.0, 140.0, 120.0, 110.0, 55.0, 45.0, 42.0])  # near critical with the rotors' inertia
 # Inertia of the rotors seen through the gears, as Franka gave it to the authors of Drake's model (of the FR3, same drives).
@@ -29,7 +30,7 @@ def panda_joint(name: str, index: int) -> str:
 
 def attach_panda(spec: Any, base: Any, name: str, mount_m: tuple[float, float, float], yaw_rad: float) -> None:
     """Attach the arm to a body of the `mujoco.MjSpec`, link0 at `mount_m` turned by `yaw_rad`, everything called `name`_...."""
-    arm = mujoco.MjSpec.from_string(resources.files("configs").joinpath("models/panda.urdf").read_text(encoding="utf-8"))
+    arm = mujoco.MjSpec.from_string(resources.files("configs").joinpath(MODEL).read_text(encoding="utf-8"))
     arm.compiler.fusestatic = False  # keep the flange
     for body in arm.bodies:
         body.gravcomp = 1.0

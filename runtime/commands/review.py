@@ -13,9 +13,10 @@ from runtime.commands.options import LogFile
 def review(
     log: LogFile,
     at: Annotated[int | None, typer.Option(metavar="TICK", min=0, help="open at this tick")] = None,
+    question: Annotated[str | None, typer.Option(metavar="NAME", help="open at this tab: happened or late")] = None,
     screenshot: Annotated[Path | None, typer.Option(help="write a picture instead of opening a window")] = None,
 ) -> None:
     """Open a recording in the Rerun viewer, on loopback only."""
     from runtime.log import review as reviewing
 
-    reviewing.review(log, at, screenshot)
+    reviewing.review(log, at, screenshot, None if question is None else reviewing.question_named(question))

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import rerun as rr
 
+from drivers.interface.mission import Goal
 from drivers.interface.samples import EmergencyStop, Jog, NewGoal, OperatorAction, ResetFaults, SetEnabled, SetPaused
 from runtime.cycle import Cycle
 from runtime.faults import FaultReport, Response
@@ -40,12 +41,16 @@ class Events:
         self._state: Rows[str] = Rows(RESPONSE, _states, [(RESPONSE, _state_style())])
         self._response: Response | None = None
         self._faults: dict[tuple[str, str], FaultReport] = {}
+        self._goals: tuple[Goal, ...] | None = None
+        self._contacts: tuple[str, ...] = ()
 
     def put(self, cycle: Cycle) -> None:
         """Write what is new."""
         tick, verdict = cycle.sensed.tick, cycle.verdict
         for event in cycle.sensed.operator:
             self._text.add(tick, Event(rr.TextLogLevel.INFO, f"operator: {_action(event.action)}"))
+        for news in self._on_the_way(cycle):
+            self._text.add(tick, news)
         faults = {(report.fault.value, report.device): report for report in verdict.faults}
         for key, report in faults.items():
             if key not in self._faults:
@@ -58,6 +63,22 @@ class Events:
             self._response = verdict.response
             self._state.add(tick, verdict.response.name)
             self._text.add(tick, Event(_LEVELS[verdict.response], f"response: {verdict.response.name}"))
+
+    def _on_the_way(self, cycle: Cycle) -> list[Event]:
+        """Return which goal lies behind the robot now, and what it has begun to touch."""
+        goals, truth, events = cycle.sensed.mission.goals, cycle.sensed.truth, []
+        if self._goals and goals == self._goals[1:]:
+            events.append(Event(rr.TextLogLevel.INFO, f"goal reached: {_place(self._goals[0])}"))
+        if goals != self._goals and goals:
+            events.append(
+                Event(rr.TextLogLevel.INFO, f"goal: {_place(goals[0])}" + f", then {len(goals) - 1} more" * (len(goals) > 1))
+            )
+        contacts = truth.contacts if truth is not None else ()
+        events += [
+            Event(rr.TextLogLevel.CRITICAL, f"the robot touches {name}") for name in contacts if name not in self._contacts
+        ]
+        self._goals, self._contacts = goals, contacts
+        return events
 
     def send(self, sink: Sink) -> None:
         """Send the rows and start a new batch."""
@@ -73,6 +94,10 @@ def _name(report: FaultReport) -> str:
     return report.fault.value + (f" of {report.device}" if report.device else "")
 
 
+def _place(goal: Goal) -> str:
+    return f"{goal.x_m:g} m, {goal.y_m:g} m"
+
+
 def _action(action: OperatorAction) -> str:
     match action:
         case SetEnabled(enabled):
@@ -82,7 +107,7 @@ def _action(action: OperatorAction) -> str:
         case Jog(twist):
             return f"jog {twist.vx:g} m/s, {twist.vy:g} m/s, {twist.wz:g} rad/s"
         case NewGoal(goal):
-            return f"new goal at {goal.x_m:g} m, {goal.y_m:g} m"
+            return f"new goal at {_place(goal)}"
         case EmergencyStop():
             return "emergency stop"
         case ResetFaults():

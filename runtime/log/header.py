@@ -10,7 +10,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Literal
 
-from drivers.interface.geometry import SE2
+from drivers.interface.geometry import SE2, SE3
+from runtime.log.urdf import Link
 
 SCHEMA_VERSION = 1  # of the replay columns; raised when a reader of the old ones would misread the new
 
@@ -28,6 +29,14 @@ class SceneShape:
 
 
 @dataclass(frozen=True, slots=True)
+class ArmShape:
+    """An arm for the viewer: where its foot stands on the robot, and its links."""
+
+    base_from_foot: SE3
+    links: tuple[Link, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class RunHeader:
     """Everything that was fixed before the first tick."""
 
@@ -37,6 +46,8 @@ class RunHeader:
     planner: str
     robot_radius_m: float
     robot_height_m: float = 0.3
+    devices: tuple[str, ...] = ()  # by their names in the robot
+    arm: ArmShape | None = None
     static: tuple[SceneShape, ...] = ()
     movers: tuple[SceneShape, ...] = ()  # shapes of what the truth reports as moving, matched by name
     code_version: str = ""

@@ -12,33 +12,41 @@ import rerun as rr
 from drivers.interface.commands import Command
 from estimators.belief import Belief
 from planners.planner import Diagnostics
-from runtime.cycle import STAGES, Cycle
+from runtime.cycle import Cycle
 from runtime.log import colours
 from runtime.log.columns import ArrowColumn, offsets_of
+from runtime.log.header import RunHeader
 from runtime.log.layers import Layer, Rows
 from runtime.log.leaves import said
 from runtime.log.sink import Sink
 
+CLEARANCE = "/view/clearance"
+SPEED = "/view/speed"
+PLANNER = "/view/planner"
+SHIELD = "/view/shield"
 AXES = ("vx", "vy", "wz")
 NAN = float("nan")
 Values = tuple[float, ...]
 _SCALARS = next(iter(rr.Scalars.columns(scalars=[0.0]))).component_descriptor()
 
 
-def layers(robot_radius_m: float) -> list[Layer[Any]]:
-    """Return the fixed plots.  What lies under /timing alone may differ between two lockstep runs of one seed."""
+def layers(header: RunHeader) -> list[Layer[Any]]:
+    """Return what every robot's planner and estimator is plotted by."""
     pair = (colours.ASKED, colours.SENT)
     both = (colours.SENT, colours.TRUTH)
-    return [
+    base = [
         *(Layer(_commanded(axis), series(f"/view/command/{axis}", ("asked", "sent"), pair)) for axis in AXES),
-        Layer(_clearances(robot_radius_m), series("/view/clearance", ("believed", "true"), both)),
-        Layer(_speeds, series("/view/speed", ("believed", "true"), both)),
-        Layer(lambda c: tuple(ns / 1e6 for ns in c.stage_ns), series("/timing/stages", STAGES, colours.STAGES)),
-        Layer(lambda c: (c.sensed.tick.lateness_ns / 1e6,), series("/timing/lateness", ("late",), (colours.MOVING,))),
+        Layer(_speeds, series(SPEED, ("believed", "true"), both)),
+    ]
+    return [
+        Layer(_clearances(header.robot_radius_m), series(CLEARANCE, ("believed", "true"), both)),
+        *(base if "base" in header.devices else ()),
     ]
 
 
-def series(entity: str, names: Sequence[str], palette: Sequence[colours.Rgb] | None = None) -> Rows[Values]:
+def series(
+    entity: str, names: Sequence[str], palette: Sequence[colours.Rgb] | None = None, *, steps: bool = False
+) -> Rows[Values]:
     """Return rows of one value per name, plotted as lines; of a pair the first is drawn wide, so that both can be seen."""
 
     def columns(rows: list[Values]) -> list[ArrowColumn]:
@@ -46,8 +54,10 @@ def series(entity: str, names: Sequence[str], palette: Sequence[colours.Rgb] | N
         ends = list(accumulate(len(row) for row in rows))
         return [ArrowColumn(_SCALARS, pa.ListArray.from_arrays(offsets_of(ends), flat))]
 
-    widths = [3.5, 1.5] if len(names) == 2 else [1.5] * len(names)
-    return Rows(entity, columns, [(entity, rr.SeriesLines(names=list(names), colors=palette, widths=widths))])
+    widths = [3.5, 1.5] if len(names) == 2 and not steps else [1.5] * len(names)
+    mode = "StepAfter" if steps else None
+    style = rr.SeriesLines(names=list(names), colors=palette, widths=widths, interpolation_mode=mode)
+    return Rows(entity, columns, [(entity, style)])
 
 
 class Diagnosed:

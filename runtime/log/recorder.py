@@ -34,6 +34,7 @@ class _Entry(NamedTuple):
     cycle: Cycle
     drawn: bool
     lost_before: int
+    waiting: int  # ticks that were in the queue before it
 
 
 class _Signal:
@@ -107,7 +108,7 @@ class Recorder:
                 return
         drawn = self._lockstep or 2 * waiting < self._capacity
         self._dropped_views += not drawn
-        self._queue.append(_Entry(cycle, drawn, self._lost))
+        self._queue.append(_Entry(cycle, drawn, self._lost, waiting))
         self._lost = 0
         self._high_water = max(self._high_water, waiting + 1)
         if waiting + 1 >= (self._due or self._ticks_due(cycle)):
@@ -165,7 +166,7 @@ class Recorder:
         entries = [self._queue.popleft() for _ in range(min(len(self._queue), self._settings.batch_ticks))]
         self._room.give()
         for entry in entries:
-            writer.put(entry.cycle, drawn=entry.drawn, lost_before=entry.lost_before)
+            writer.put(entry.cycle, drawn=entry.drawn, lost_before=entry.lost_before, waiting=entry.waiting)
         writer.send()
         while not (flushed := writer.flush(self._settings.flush_interval_s)) and not self._closing:
             pass  # the disk is stalled: what comes meanwhile waits in our queue, which is bounded, and not in Rerun, which is not

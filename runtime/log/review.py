@@ -13,6 +13,7 @@ from pathlib import Path
 from rerun.experimental import ViewerClient
 
 from drivers.interface.errors import ConfigurationError
+from runtime.log.layout import Question
 from runtime.log.opening import require_log
 from runtime.log.read import ticks
 from runtime.log.repair import quiet_environment, rerun_program
@@ -24,8 +25,14 @@ _SETTLE_S = 15.0  # until the viewer's notices about itself have faded and every
 _PACKAGES = "mesa-vulkan-drivers libxkbcommon-x11-0 libxcursor1 libxi6 libxrandr2 libx11-xcb1"
 
 
-def review(log: Path, at_tick: int | None = None, screenshot: Path | None = None, window: str = WINDOW) -> None:
-    """Open a log, at a tick if one is given; with `screenshot`, write a picture of it instead and return.
+def review(
+    log: Path,
+    at_tick: int | None = None,
+    screenshot: Path | None = None,
+    question: Question | None = None,
+    window: str = WINDOW,
+) -> None:
+    """Open a log at a tick and at a question's tab, if they are given; with `screenshot`, only write a picture of it.
 
     Raises:
         ConfigurationError: the log, the tick or this machine's graphics will not do; says why.
@@ -36,8 +43,10 @@ def review(log: Path, at_tick: int | None = None, screenshot: Path | None = None
     if screenshot is None and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise ConfigurationError("there is no display to open the viewer on; --screenshot PATH takes a picture without one")
     with _Viewer(log, window, headless=screenshot is not None) as viewer:
-        if at_tick is not None or screenshot is not None:
+        if at_tick is not None or question is not None or screenshot is not None:
             client = _connect(viewer)
+            if question is not None:
+                _turn_to(client, question)
             if at_tick is not None:
                 client.set_time("tick", sequence=at_tick, play_state="paused")
             if screenshot is not None:
@@ -45,6 +54,34 @@ def review(log: Path, at_tick: int | None = None, screenshot: Path | None = None
                 return
         if viewer.process.wait() != 0:
             raise viewer.failure()
+
+
+def question_named(name: str) -> Question:
+    """Return the question of this name.
+
+    Raises:
+        ConfigurationError: there is none.
+    """
+    known = [question.value for question in Question]
+    if name not in known:
+        raise ConfigurationError(f"--question takes {' or '.join(known)}, not '{name}'")
+    return Question(name)
+
+
+def _turn_to(client: ViewerClient, question: Question) -> None:
+    """Bring the tab of a question to the front.
+
+    Raises:
+        ConfigurationError: the log's layout has no such tab.
+    """
+    layout = client.get_blueprint("recording").blueprint
+    containers = {entity: parts["ContainerBlueprint"] for entity, parts in layout.items() if "ContainerBlueprint" in parts}
+    wanted = [entity for entity, container in containers.items() if container.get("display_name") == question.tab]
+    tabs = [container for container in containers.values() if wanted and wanted[0] in container["contents"]]
+    if not tabs:
+        raise ConfigurationError(f"--question {question.value}: the log's layout has no tab '{question.tab}'")
+    tabs[0]["active_tab"] = wanted[0]
+    client.set_blueprint(layout, "recording")
 
 
 def _require_tick(log: Path, tick: int) -> None:

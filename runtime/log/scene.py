@@ -13,17 +13,18 @@ from drivers.interface.geometry import SE2, SE3
 from drivers.interface.mission import Goal
 from drivers.interface.samples import Intrinsics
 from runtime.cycle import Cycle
-from runtime.log import colours, rvl, shapes
+from runtime.log import arm, colours, rvl, shapes, tracks
 from runtime.log.header import RunHeader
 from runtime.log.layers import EQUAL, IDENTICAL, Layer, Rows, Static
 from runtime.log.maps import clearance_columns, grid_columns
 from runtime.log.settings import LogSettings
 
 MAP = "/view/map"
-FOCUS = f"{MAP}/focus"  # moves with the robot but does not turn: what the eyes of the layout hang on
+FOCUS = f"{MAP}/focus"  # moves with the robot and keeps the heading of the start: what the eyes of the layout hang on
 ODOM = f"{MAP}/odom"
 BASE = f"{ODOM}/base"
 CAMERA = f"{BASE}/camera"
+ARM = f"{BASE}/arm"
 DEPTH = "/replay/sensed/depth"  # the exact image is also the one that is shown
 DEPTH_SHOWN_M = 6.0  # the last colour
 _IMAGE_FRAME = "depth_image"
@@ -42,7 +43,7 @@ def layers(header: RunHeader, settings: LogSettings) -> list[Layer[Any]]:
     often = round(1e9 / settings.view_rate_hz)
     return [
         Layer(lambda c: c.belief.map_from_odom, Rows(ODOM, _poses), EQUAL),
-        Layer(lambda c: SE2(c.belief.map_from_base.x, c.belief.map_from_base.y), Rows(FOCUS, _poses)),
+        Layer(_focus, Rows(FOCUS, _poses)),
         Layer(lambda c: c.belief.odom_from_base, Rows(BASE, _poses, shapes.robot(BASE, header))),
         Layer(_camera, Rows(CAMERA, _cameras), EQUAL),
         Layer(_depth_unit, Rows(DEPTH, _depth_scales, _depth_style()), EQUAL),
@@ -54,7 +55,14 @@ def layers(header: RunHeader, settings: LogSettings) -> list[Layer[Any]]:
         Layer(lambda c: c.belief.map_from_base, _dots(f"{MAP}/trail", colours.SENT)),
         Layer(_truth, _dots(f"{MAP}/truth", colours.TRUTH)),
         *shapes.movers(f"{MAP}/movers", header.movers),
+        *tracks.layers(f"{ODOM}/tracks", often),
+        *(arm.layers(ARM, header.arm) if header.arm is not None else ()),
     ]
+
+
+def _focus(cycle: Cycle) -> SE2:
+    pose = cycle.belief.map_from_base
+    return SE2(pose.x, pose.y, cycle.sensed.mission.map_from_start.yaw)
 
 
 def _truth(cycle: Cycle) -> SE2 | None:

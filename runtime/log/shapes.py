@@ -21,7 +21,9 @@ Placed = tuple[SceneShape, SE2]
 
 
 def robot(entity: str, header: RunHeader) -> Static:
-    """Return the robot's body, a cylinder, with an arrow for where it faces; in its own frame."""
+    """Return the robot's body, a cylinder, with an arrow for where it faces; in its own frame.  An arm is drawn by its links."""
+    if header.arm is not None and "base" not in header.devices:
+        return ()
     height = header.robot_height_m
     body = rr.Cylinders3D(
         lengths=[height],

@@ -9,7 +9,7 @@ from typing import Protocol
 import rerun as rr
 
 from runtime.cycle import Cycle
-from runtime.log import plots, scene
+from runtime.log import plots, scene, timing
 from runtime.log.columns import ArrowColumn, timelines
 from runtime.log.events import Events
 from runtime.log.exact import ExactPart
@@ -47,11 +47,13 @@ class Writer:
         self._exact = ExactPart(settings.depth)
         self._drawn: tuple[Drawn, ...] = (
             *scene.layers(header, settings),
-            *plots.layers(header.robot_radius_m),
-            plots.Diagnosed("/view/planner", plots.planner_diagnostics),
-            plots.Diagnosed("/view/shield", plots.shield_diagnostics),
+            *plots.layers(header),
+            plots.Diagnosed(plots.PLANNER, plots.planner_diagnostics),
+            plots.Diagnosed(plots.SHIELD, plots.shield_diagnostics),
             Events(),
         )
+        self._timed: tuple[Drawn, ...] = (*timing.layers(), timing.DevicePlots())
+        self._queue = timing.Queue()
         self._draw_interval_ns = round(1e9 * (settings.draw_interval_s if live_port is None else settings.flush_interval_s))
         self._draw_due_ns = 0
         self._ticks: list[int] = []
@@ -70,11 +72,16 @@ class Writer:
         """Size of the file so far."""
         return self._sink.bytes_written
 
-    def put(self, cycle: Cycle, *, drawn: bool, lost_before: int) -> None:
-        """Add a tick to the batch; one that is not drawn is only recorded for replay."""
+    def put(self, cycle: Cycle, *, drawn: bool, lost_before: int, waiting: int = 0) -> None:
+        """Add a tick to the batch, handed over when `waiting` others were; one that is not drawn has only its exact part and
+        what tells why it was late.
+        """
         self._ticks.append(cycle.sensed.tick.index)
         self._starts_ns.append(cycle.sensed.tick.start_ns)
         self._exact.put(cycle, lost_before)
+        self._queue.put(cycle, waiting, lost_before)
+        for timed in self._timed:
+            timed.put(cycle)
         if drawn:
             for part in self._drawn:
                 part.put(cycle)
@@ -94,8 +101,9 @@ class Writer:
 
     def send_drawn(self) -> None:
         """Send what waits to be drawn."""
-        for part in self._drawn:
+        for part in (*self._drawn, *self._timed):
             part.send(self._sink)
+        self._queue.send(self._sink)
 
     def _index(self, rows: Sequence[int]) -> tuple[ArrowColumn, ArrowColumn]:
         return timelines(tuple(self._ticks[row] for row in rows), tuple(self._starts_ns[row] for row in rows))

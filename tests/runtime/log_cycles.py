@@ -53,7 +53,8 @@ class Cost(Diagnostics):
 
 def header(**changes: object) -> RunHeader:
     walls = tuple(SceneShape(f"wall_{i}", "box", SE2(3.0, y), (5.0, 0.05, 0.4)) for i, y in enumerate((-1.25, 1.25)))
-    return RunHeader("robot: {}\n", 3, "hallway", "dwa", 0.12, **({"static": walls, "movers": (WALKER,)} | changes))
+    known = {"static": walls, "movers": (WALKER,), "devices": ("camera", "imu", "base", "truth")}
+    return RunHeader("robot: {}\n", 3, "hallway", "dwa", 0.12, **(known | changes))
 
 
 def depth_frame(index: int, start_ns: int, intrinsics: Intrinsics = INTRINSICS) -> DepthFrame:

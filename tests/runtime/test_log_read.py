@@ -7,7 +7,6 @@ import pytest
 import rerun as rr
 
 from drivers.interface.errors import ConfigurationError
-from runtime.log.opening import reader_of
 from runtime.log.read import read, texts, ticks
 from runtime.log.repair import repair
 from runtime.log.review import review
@@ -52,6 +51,7 @@ def test_a_flipped_bit_is_an_error_or_named_but_never_silently_other_data(log: P
 def test_the_words_tell_what_happened_and_when_it_was_over(log: Path) -> None:
     assert ticks(log) == list(range(12))
     assert texts(log).splitlines() == [
+        "goal: 7 m, 0 m",
         "response: RUN",
         "operator: jog 0.1 m/s, 0 m/s, -0 rad/s",
         "operator: new goal at 1 m, 2 m",
@@ -107,16 +107,3 @@ def test_a_repair_never_overwrites_and_says_when_nothing_is_left(log: Path, tmp_
     (tmp_path / "text.rrd").write_text("not a recording")
     with pytest.raises(ConfigurationError, match=r"nothing of .* can be saved"):
         repair(tmp_path / "text.rrd", tmp_path / "b.rrd")
-
-
-def test_every_view_of_the_layout_finds_what_it_shows(log: Path) -> None:
-    """The origins of the embedded layout's views are entities of the log."""
-    reader = reader_of(log)
-    entities = set(read(log).entities)
-    origins = set()
-    for chunk in reader.stream(store=reader.blueprints()[0]):
-        batch = chunk.to_record_batch()
-        if "ViewBlueprint:space_origin" in batch.schema.names:
-            origins |= {cell[0] for cell in batch.column("ViewBlueprint:space_origin").to_pylist()}
-    assert len(origins) >= 9
-    assert origins <= entities

@@ -252,11 +252,11 @@ def test_a_log_that_was_cut_anywhere_gives_back_its_whole_batches(tmp_path: Path
 
 
 def test_a_disk_that_fills_up_is_a_fault_and_the_process_goes_on_and_ends(tmp_path: Path) -> None:
-    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400_000))\n"
+    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (800_000, 800_000))\n"
     child = start(tmp_path / "a.rrd", limit + RECORD_UNTIL_KILLED)
     output, _ = child.communicate(timeout=60)
     fault, written = output.splitlines()[-2:]
     assert fault == f"fault: the log {tmp_path / 'a.rrd'} cannot be written: File too large"
     assert int(written) > 0
     assert child.returncode == 0
-    assert (tmp_path / "a.rrd").stat().st_size == 400_000
+    assert (tmp_path / "a.rrd").stat().st_size == 800_000
