@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import time
 from importlib import resources
 
 from drivers.interface.geometry import SE2, SE3
 from runtime.assembly import Assembly
 from runtime.configuration import Choice, Configuration
+from runtime.doctor.findings import recent_examination
 from runtime.log.header import ArmShape, RunHeader, SceneShape, code_version, library_versions, machine
 from runtime.log.urdf import links_of
 from sim_drivers.scene import Scene, Shape
@@ -30,6 +32,7 @@ def run_header(assembly: Assembly, seed: int) -> RunHeader:
         code_modified=modified,
         libraries=library_versions(),
         machine=machine(),
+        doctor=recent_examination(configuration.robot.name, time.time()),
     )
 
 
