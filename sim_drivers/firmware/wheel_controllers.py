@@ -44,6 +44,16 @@ class OmniCanWire(CanWire, Protocol):
         ...
 
     @property
+    def signs(self) -> tuple[int, int, int]:
+        """Of each motor: -1 turns the other way round."""
+        ...
+
+    @property
+    def gear_ratio(self) -> float:
+        """Turns of the motor for one of the wheel."""
+        ...
+
+    @property
     def nominal(self) -> OmniThreeWheel:
         """The geometry on the drawing."""
         ...
@@ -61,6 +71,7 @@ class WheelControllers:
         self._settings = settings
         self._setup = setup
         self._nodes = tuple(driver_settings.node_ids)
+        self._motor_from_wheel = np.array(driver_settings.signs) * driver_settings.gear_ratio  # (3,)
         size_m = (settings.radius_m, settings.height_m)
         self._chassis = RollerOmniChassis(_true(driver_settings.nominal, settings), settings.mass_kg, size_m, settings.torque_nm)
         self._port = CanPort(driver_settings, setup.name)
@@ -68,7 +79,7 @@ class WheelControllers:
         self._losses = stream(setup.seed, f"{setup.name}.loss")
         self._servos = slice(0, 0)
         self._velocities: list[int] = []
-        self._zero_rad = np.zeros(3)  # an encoder counts from where its axis woke up
+        self._zero_rad = np.zeros(3)  # of the motors; an encoder counts from where its axis woke up
         self._power_up(0)
         setup.world.add(self)
 
@@ -117,7 +128,7 @@ class WheelControllers:
         velocity = self._velocity_rad_s / TURN
         self._strike(world)
         targets = [axis.step(now_ns, turns[i], velocity[i]) for i, axis in enumerate(self._axes)]
-        self._drive(world, np.array(targets) * TURN)
+        self._drive(world, np.array(targets) * TURN / self._motor_from_wheel)
         torque_nm = np.where([axis.armed for axis in self._axes], world.data.actuator_force[self._servos], 0.0)
         self._power.step(now_ns, torque_nm, world.data.qvel[self._velocities])
         if now_ns >= self._ready_ns:
@@ -151,12 +162,15 @@ class WheelControllers:
         return {command: period_ms * 1_000_000 for command, period_ms in periods.items() if period_ms}
 
     def _measure(self, world: MujocoWorld) -> F64:
-        """Return how far the wheels have turned since power-up [turn], shape (3,), as the encoders count."""
+        """Return how far the motors have turned since power-up [turn], shape (3,), as the encoders count."""
         if self._encoders.due(world.now_ns):
-            self._encoders.measure(world.now_ns, self._chassis.wheel_angles(world) - self._zero_rad)
+            self._encoders.measure(world.now_ns, self._motor_rad(world) - self._zero_rad)
             for sample in self._encoders.delivery.drain(world.now_ns):
                 self._position_rad, self._velocity_rad_s = sample.position_rad, sample.velocity_rad_s
         return self._position_rad / TURN
+
+    def _motor_rad(self, world: MujocoWorld) -> F64:
+        return self._motor_from_wheel * self._chassis.wheel_angles(world)
 
     def _hear(self, world: MujocoWorld, turns: F64) -> None:
         for frame in self._port.receive():
@@ -186,7 +200,7 @@ class WheelControllers:
 
     def _reboot(self, world: MujocoWorld, index: int) -> None:
         """Power one axis up anew: idle, its encoder counts from where the wheel stands."""
-        self._zero_rad[index] = self._chassis.wheel_angles(world)[index]
+        self._zero_rad[index] = self._motor_rad(world)[index]
         self._axes[index] = Axis(self._settings.axis, self._settings.version, world.now_ns)
 
     def _drive(self, world: MujocoWorld, rates_rad_s: F64) -> None:

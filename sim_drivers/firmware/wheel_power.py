@@ -14,12 +14,12 @@ F64 = NDArray[np.float64]
 
 
 class PowerSettings(Settings):
-    """Battery and motors; the defaults are a six-cell LiFePO4 pack and small hub motors."""
+    """Battery and motors; the defaults are a pack of six lithium-ion cells and small hub motors."""
 
-    open_voltage_v: float = Field(default=19.8, gt=5.0, le=100.0, description="of the battery at the start")
+    open_voltage_v: float = Field(default=24.6, gt=5.0, le=100.0, description="of the battery at the start")
     resistance_ohm: float = Field(default=0.08, ge=0.0, le=10.0, description="of battery and leads")
     capacity_ah: float = Field(default=10.0, gt=0.01, le=1000.0, description="of the battery, full at the start")
-    empty_voltage_v: float = Field(default=16.5, gt=1.0, le=100.0, description="open voltage of the empty battery")
+    empty_voltage_v: float = Field(default=19.0, gt=1.0, le=100.0, description="open voltage of the empty battery")
     idle_current_a: float = Field(default=0.08, ge=0.0, le=10.0, description="of each controller")
     torque_constant_nm_a: float = Field(default=0.4, gt=0.001, le=10.0, description="of each motor")
     phase_resistance_ohm: float = Field(default=0.3, gt=0.0, le=10.0, description="of each motor")

@@ -34,7 +34,7 @@ class WheelControllerSettings(Settings):
     )
     axis: AxisSettings = AxisSettings()
     power: PowerSettings = PowerSettings()
-    encoder_counts_per_turn: int = Field(default=8192, ge=16, le=10_000_000, description="of the encoder, at the wheel")
+    encoder_counts_per_turn: int = Field(default=8192, ge=16, le=10_000_000, description="of the encoder, on the motor")
     heartbeat_ms: int = Field(default=100, ge=0, le=10_000, description="heartbeat_rate_ms; 0: only on request")
     encoder_ms: int = Field(default=10, ge=0, le=10_000, description="encoder_rate_ms")
     bus_ms: int = Field(default=100, ge=0, le=10_000, description="bus_vi_rate_ms")

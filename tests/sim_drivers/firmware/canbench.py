@@ -28,6 +28,8 @@ class Wire:
     channel: str
     node_ids: tuple[int, int, int] = NODES
     nominal: OmniThreeWheel = BASE
+    signs: tuple[int, int, int] = (1, 1, 1)
+    gear_ratio: float = 1.0
 
     @property
     def bus_arguments(self) -> dict[str, Any]:
@@ -92,14 +94,16 @@ class CanBench:
 
 
 @contextmanager
-def can_bench(seed: int = 1, **settings: Any) -> Iterator[CanBench]:
+def can_bench(seed: int = 1, wire: dict[str, Any] | None = None, **settings: Any) -> Iterator[CanBench]:
     world = MujocoWorld(Square(SquareSettings()).draw(0), WorldSettings())
-    wire = Wire(f"bench-{next(_channels)}")
+    driver = Wire(f"bench-{next(_channels)}", **(wire or {}))
     quiet = {"loss_probability": 0.0, "boot_s": 0.0} | settings
-    firmware = WheelControllers(wire, WheelControllers.Settings(**quiet), FirmwareSetup("base", seed, world, LockstepHost(world)))
+    firmware = WheelControllers(
+        driver, WheelControllers.Settings(**quiet), FirmwareSetup("base", seed, world, LockstepHost(world))
+    )
     world.compile()
     firmware.open()
-    with can.Bus(**wire.bus_arguments) as bus:
+    with can.Bus(**driver.bus_arguments) as bus:
         try:
             yield CanBench(world, firmware, bus)
         finally:

@@ -173,13 +173,23 @@ def test_a_set_point_that_is_no_number_disarms(bad):
         assert state(bench.ask(0xA1)[0]) == CLOSED_LOOP
 
 
+def test_motors_may_turn_the_other_way_round_and_faster_than_the_wheels():
+    wire = {"signs": (-1, -1, -1), "gear_ratio": 4.0}
+    with can_bench(wire=wire, axis={"velocity_limit_turns_s": 20.0}, wheel_radius_error=(0, 0, 0)) as bench:
+        bench.arm()
+        bench.drive(tuple(-4.0 * rate for rate in FORWARD), 2.0)
+        assert bench.world.data.body("base").xpos[0] == pytest.approx(0.6, abs=0.05)
+        estimates = [struct.unpack("<ff", bench.frames(node << 5 | 9)[-1]) for node in NODES]
+        assert [velocity for _, velocity in estimates] == pytest.approx([-4.0 * rate for rate in FORWARD], abs=0.1)
+
+
 def test_answers_requests_of_its_own_version_only():
     with can_bench(version="0.6") as new, can_bench(version="0.5") as old:
         assert new.ask(0x80)[0][:1] == b"\x02"  # protocol version 2
         assert new.ask(0x80)[0][4:7] == bytes([0, 6, 10])
         assert old.ask(0x80) == []
         volts, amperes = struct.unpack("<ff", new.ask(0x97)[0])
-        assert 19.0 < volts < 20.0
+        assert 24.0 < volts < 25.0
         assert 0.05 < amperes < 0.2
         assert struct.unpack("<ff", new.ask(0x95)[0]) == (25.0, 25.0)
         assert old.ask(0x95) == []
