@@ -22,7 +22,6 @@ from dataclasses import dataclass
 
 from drivers.interface.devices import DeviceState
 from drivers.interface.errors import TrundleError
-from drivers.interface.settings import Settings
 from drivers.io.backoff import Backoff, BackoffSettings
 from drivers.io.channels import Channels, MemorySpec
 from drivers.io.last_hop import LastHop
@@ -40,7 +39,7 @@ class Task:
 
     name: str
     session: str  # "module:Class"
-    settings: Settings
+    settings: object
     memory: MemorySpec
     size: int
     backoff: BackoffSettings

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from drivers.interface.devices import DeviceState
 from drivers.interface.errors import DeviceError
-from drivers.interface.settings import Settings
 from drivers.io.backoff import Backoff, BackoffSettings
 from drivers.io.channels import Channels, MemorySpec
 from drivers.io.child import Task
@@ -33,7 +32,7 @@ class IoSpec:
 
     name: str  # of the device in the robot, for messages
     session: str  # "module:Class"
-    settings: Settings  # of the session; pickled
+    settings: object  # of the session; pickled
     memory: MemorySpec
     wire: BackoffSettings = field(default_factory=BackoffSettings)  # for a lost wire; the same process tries again
     restart: BackoffSettings = field(default_factory=lambda: BackoffSettings(tries=5))  # for a dead or stuck process
@@ -118,6 +117,11 @@ class IoProcess:
         if record.state is DeviceState.FAULTED and record.resets_done < self._channels.command.resets:
             return replace(record, state=DeviceState.RECONNECTING, fault="its faults are being cleared")
         return record
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it was opened and not closed since, whatever has become of the device."""
+        return self._open
 
     @property
     def pid(self) -> int | None:
