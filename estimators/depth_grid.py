@@ -47,12 +47,16 @@ class DepthGridSettings(Settings):
 
 
 def is_sound(frame: DepthFrame) -> bool:
-    """Tell whether a frame can be projected: pose, intrinsics and unit finite, and the image of the size they are for."""
+    """Tell whether a frame can be projected: pose, intrinsics and unit finite, and the image of the size they are for.
+
+    A camera below the ground is none: a frame that claims it would make obstacles of the floor.
+    """
     k, pose = frame.intrinsics, frame.base_from_optical
     numbers = (k.fx, k.fy, k.cx, k.cy, frame.depth_unit_m, pose.x, pose.y, pose.z, pose.qw, pose.qx, pose.qy, pose.qz)
     return (
         all(math.isfinite(number) for number in numbers)
-        and min(k.fx, k.fy, frame.depth_unit_m) > 0.0
+        and min(k.fx, k.fy, frame.depth_unit_m, frame.depth.size) > 0.0
+        and pose.z >= 0.0
         and frame.depth.dtype == np.uint16
         and frame.depth.shape == (k.height, k.width)
         and abs(pose.qw**2 + pose.qx**2 + pose.qy**2 + pose.qz**2 - 1.0) < 1e-3
