@@ -45,6 +45,8 @@ class MotionFilter:
     def warm_up(self) -> None:
         """Compile the motion model and the gate."""
         squared_surprise(np.zeros(3), np.eye(3))
+        if self._wheels is not None:
+            self._wheels.warm_up()
         transition(np.zeros(STATES), Inertial(0.0, 0.0, 0.0, True, 1.0, 1.0), self._walk_std, 0.01)
 
     def fold(self, state: EkfState, sample: Sample) -> EkfState:
@@ -119,8 +121,7 @@ class MotionFilter:
 
     def _plausible(self, way: WheelWay, elapsed_s: float) -> bool:
         limits = self._limits.speed_max_m_s, self._limits.turn_rate_max_rad_s
-        turned = SE2(way.motion.x, way.motion.y, way.turned_rad)
-        reported = SE2(way.twist.vx, way.twist.vy, way.twist.wz)
+        turned, reported = SE2(*way.vector.tolist()), SE2(*way.twist.tolist())
         return is_plausible(turned, elapsed_s, *limits) and is_plausible(reported, 1.0, *limits)
 
     def _held(self, state: EkfState, time_ns: int) -> EkfState:
@@ -159,7 +160,9 @@ class MotionFilter:
         covariance[WAY] = covariance[:, WAY] = 0.0
         captured_ns, angles = sample.stamp.captured_ns, sample.position_rad.copy()
         state = state._replace(x=x, covariance=covariance, wheels_ns=captured_ns, wheels_rad=angles)
-        if state.still_rad is None or np.abs(angles - state.still_rad).max() > self._settings.still_rad:
+        if state.still_rad is None:  # a robot that is switched on stands, until its wheels say otherwise
+            return state._replace(still_ns=captured_ns - round(self._settings.still_after_s * SECOND_NS), still_rad=angles)
+        if np.abs(angles - state.still_rad).max() > self._settings.still_rad:
             return state._replace(still_ns=captured_ns, still_rad=angles)
         return state
 
@@ -174,25 +177,27 @@ class MotionFilter:
         bias_std = math.sqrt(float(state.covariance[GYRO_BIAS, GYRO_BIAS]))
         if abs(state.rate_rad_s - float(state.x[GYRO_BIAS])) > s.still_rate_rad_s + 3.0 * bias_std:
             return False
-        long = sample.stamp.captured_ns - state.still_ns >= s.still_after_s * SECOND_NS
-        return long and float(np.abs(sample.position_rad - state.still_rad).max()) <= s.still_rad
+        return (
+            sample.stamp.captured_ns - state.still_ns >= s.still_after_s * SECOND_NS
+            and float(np.abs(sample.position_rad - state.still_rad).max()) <= s.still_rad
+        )
 
     def _reckoned(self, state: EkfState, way: WheelWay, time_ns: int) -> EkfState:
         """Move by the wheels alone, where no inertial unit says anything (Thrun, Probabilistic Robotics, section 5.4)."""
-        pose, x = state.pose @ way.motion, state.x.copy()
-        c, s = math.cos(state.pose.yaw), math.sin(state.pose.yaw)
-        x[POSE] = pose.x, pose.y, state.x[YAW] + way.turned_rad
-        x[VELOCITY] = way.twist.vx, way.twist.vy
+        x, (dx, dy, turned) = state.x.copy(), way.vector.tolist()
+        c, s = math.cos(x[YAW]), math.sin(x[YAW])
+        x[POSE] += c * dx - s * dy, s * dx + c * dy, turned
+        x[VELOCITY] = way.twist[:2]
         jacobian = np.eye(STATES)
-        jacobian[0, YAW] = -s * way.motion.x - c * way.motion.y
-        jacobian[1, YAW] = c * way.motion.x - s * way.motion.y
+        jacobian[0, YAW] = -s * dx - c * dy
+        jacobian[1, YAW] = c * dx - s * dy
         jacobian[VELOCITY, VELOCITY] = 0.0
         noise = np.zeros((STATES, STATES))
         odom_from_base = np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
         noise[POSE, POSE] = odom_from_base @ way.covariance @ odom_from_base.T
         noise[VELOCITY, VELOCITY] = np.eye(2) * self._settings.blind_accel_m_s2_sqrt_hz**2
         mean, covariance = self._algebra.propagate(state, x, jacobian, noise)
-        rate = way.twist.wz + float(state.x[GYRO_BIAS])
+        rate = float(way.twist[2] + state.x[GYRO_BIAS])
         return state._replace(x=mean, covariance=covariance, time_ns=time_ns, rate_rad_s=rate, slipping=False)
 
     def _gated(self, state: EkfState, way: WheelWay, time_ns: int) -> EkfState:
@@ -214,7 +219,7 @@ class MotionFilter:
     def _begun_anew(self, state: EkfState, way: WheelWay) -> EkfState:
         """Keep the pose, believe the wheels, and learn velocity and biases again."""
         x, covariance = state.x.copy(), np.zeros((STATES, STATES))
-        x[VELOCITY], x[BIASES] = (way.twist.vx, way.twist.vy), (self._limits.gyro_bias_rad_s, 0.0, 0.0)
+        x[VELOCITY], x[BIASES] = way.twist[:2], (self._limits.gyro_bias_rad_s, 0.0, 0.0)
         covariance[POSE, POSE] = state.covariance[POSE, POSE] + np.diag(np.square(LOST_STD))
         covariance += np.diag(self._prior)
         return state._replace(x=x, covariance=covariance, rejected_ns=None, diverged=state.diverged + 1)

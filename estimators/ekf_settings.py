@@ -17,7 +17,7 @@ class EkfSettings(Settings):
     late_max_s: float = Field(default=0.3, ge=0.0, le=5.0, description="a sample that comes later than this is dropped")
     gyro_noise_rad_s_sqrt_hz: float = Field(default=3e-4, gt=0.0, le=1.0, description="white noise of the yaw rate")
     gyro_walk_rad_s2_sqrt_hz: float = Field(default=2e-5, gt=0.0, le=0.1, description="random walk of its bias")
-    gyro_bias_std_rad_s: float = Field(default=0.02, gt=0.0, le=1.0, description="of the bias at the start")
+    gyro_bias_std_rad_s: float = Field(default=0.0175, gt=0.0, le=1.0, description="of the bias at the start; BMI055: 1 deg/s")
     gyro_bias_max_rad_s: float = Field(default=0.2, gt=0.0, le=5.0, description="a larger one means wrong units: diverged")
     accel_noise_m_s2_sqrt_hz: float = Field(default=0.03, gt=0.0, le=10.0, description="white noise, lever arm and vibration")
     accel_walk_m_s3_sqrt_hz: float = Field(default=2e-3, gt=0.0, le=1.0, description="random walk of its bias, tilt included")
@@ -32,7 +32,7 @@ class EkfSettings(Settings):
     still_rad: float = Field(
         default=4e-3, ge=0.0, le=0.1, description="wheels that turn no further than their counting jitters stand"
     )
-    still_after_s: float = Field(default=0.3, gt=0.0, le=10.0, description="and the base with them, after this")
+    still_after_s: float = Field(default=0.3, gt=0.0, le=10.0, description="and the base with them, after this; at once at start")
     still_rate_rad_s: float = Field(default=0.01, ge=0.0, le=1.0, description="if the gyro, too, turns no faster than this")
     still_std: float = Field(
         default=2e-5, gt=0.0, le=1e-2, description="m and rad: how far a base that stands moves between samples"
@@ -43,6 +43,10 @@ class EkfSettings(Settings):
     yaw_variance_rad2_per_rad: float = Field(default=2e-3, ge=0.0, le=1.0, description="slip of the wheels in turning")
     way_scale_std: float = Field(default=0.03, ge=0.0, le=1.0, description="the wheels' way is wrong by this fraction")
     yaw_scale_std: float = Field(default=0.05, ge=0.0, le=1.0, description="the wheels' turning is wrong by this fraction")
+    yaw_std_rad_per_m: float = Field(default=0.02, ge=0.0, le=1.0, description="and by this a metre: unequal wheels turn a base")
+    systematic_s: float = Field(
+        default=60.0, ge=0.0, le=3600.0, description="that is wrong for so long, and must not pass for a bias of the gyro"
+    )
     innovation_gate: float = Field(default=16.3, gt=1.0, le=1e3, description="normalised, squared; chi-square, 3 dof: 99.9 %")
     skip_ratio: float = Field(
         default=4.0, ge=1.0, le=1e3, description="beyond gate times this an update is skipped, not only eased"

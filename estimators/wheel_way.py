@@ -2,34 +2,40 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
-from drivers.interface.commands import BodyTwist
-from drivers.interface.geometry import SE2
 from drivers.interface.kinematics import WheelKinematics
 from drivers.interface.samples import WheelSample
 from estimators.belief import F64
 from estimators.ekf_settings import EkfSettings
 
 LEAST = 1e-12  # m^2, rad^2: a base that cannot strafe counts nothing sideways at rest, and yet it is no certainty
+PARALLEL = 1e-9  # rad: an arc that turns less is a straight line
 
 
-@dataclass(frozen=True, slots=True)
-class WheelWay:
+class WheelWay(NamedTuple):
     """A way in the base frame of its beginning, with the twist at its end."""
 
-    motion: SE2
-    turned_rad: float  # not wrapped
-    twist: BodyTwist
-    covariance: F64  # (3, 3) of the motion: x, y [m], yaw [rad]
+    vector: F64  # (3,): x, y [m], yaw [rad] (not wrapped)
+    twist: F64  # (3,): vx, vy [m/s], wz [rad/s]
+    covariance: F64  # (3, 3) of the vector
     grip: F64  # (3, 3), the same for wheels that do not slip: what slip is told by
 
-    @property
-    def vector(self) -> F64:
-        """The way as x, y [m] and yaw [rad], shape (3,)."""
-        return np.array((self.motion.x, self.motion.y, self.turned_rad))
+
+class Trust(NamedTuple):
+    """How far wheels are believed, as the settings have it."""
+
+    way_scale_std: float
+    yaw_scale_std: float
+    yaw_std_rad_per_m: float
+    systematic_s: float
+    position_variance_m2_per_m: float
+    position_variance_m2_per_rad: float
+    yaw_variance_rad2_per_m: float
+    yaw_variance_rad2_per_rad: float
 
 
 class WheelModel:
@@ -41,50 +47,56 @@ class WheelModel:
 
     def __init__(self, settings: EkfSettings, kinematics: WheelKinematics) -> None:
         """Learn the linear map from wheel turns to the body's way by asking for each wheel's share."""
-        self._settings = settings
         self.kinematics = kinematics
         twists = [kinematics.twist(turn) for turn in np.eye(kinematics.wheel_count)]
-        columns = np.array([(twist.vx, twist.vy, twist.wz) for twist in twists]).T  # (3, wheels)
-        self._counting = settings.encoder_noise_rad**2 * columns @ columns.T  # (3, 3)
+        self._columns = np.array([(twist.vx, twist.vy, twist.wz) for twist in twists]).T.copy()  # (3, wheels)
+        self._counting = settings.encoder_noise_rad**2 * self._columns @ self._columns.T  # (3, 3)
+        self._trust = Trust(*(getattr(settings, name) for name in Trust._fields))
+        self._still = np.eye(3) * settings.still_std**2
+
+    def warm_up(self) -> None:
+        """Compile the kernel."""
+        turns = np.zeros(self.kinematics.wheel_count)
+        _way(self._columns, turns, turns, 1.0, self._counting, self._trust)
 
     def usable(self, sample: WheelSample) -> bool:
         """Tell whether a sample has as many finite values as the base has wheels."""
         count = (self.kinematics.wheel_count,)
-        return (
-            sample.position_rad.shape == sample.velocity_rad_s.shape == count
-            and bool(np.isfinite(sample.position_rad).all())
-            and bool(np.isfinite(sample.velocity_rad_s).all())
-        )
+        position, rates = sample.position_rad, sample.velocity_rad_s
+        if position.shape != count or rates.shape != count:
+            return False
+        return bool(np.isfinite(position.dot(position)) and np.isfinite(rates.dot(rates)))
 
     def way(self, before_rad: F64, sample: WheelSample, elapsed_s: float) -> WheelWay:
         """Return the way since the wheels stood at `before_rad`, shape (wheels,)."""
-        mean = self.kinematics.twist((sample.position_rad - before_rad) / elapsed_s)
-        motion = SE2().integrate(mean.vx, mean.vy, mean.wz, elapsed_s)
-        way_m, turned_rad = mean.speed_m_s * elapsed_s, mean.wz * elapsed_s
-        twist = self.kinematics.twist(sample.velocity_rad_s)
-        grip = self._grip(way_m, abs(turned_rad))
-        return WheelWay(motion, turned_rad, twist, self._slipping(grip, way_m, abs(turned_rad)), grip)
+        turns = sample.position_rad - before_rad
+        # The rates come from a sample, whose arrays are read-only: a copy spares the kernel a second type to compile for.
+        return WheelWay(*_way(self._columns, turns, sample.velocity_rad_s.copy(), elapsed_s, self._counting, self._trust))
 
     def standstill(self) -> WheelWay:
         """Return the way of a base that stands; it says more of the gyro's bias than wheels that are counted can."""
-        covariance = np.eye(3) * self._settings.still_std**2
-        return WheelWay(SE2(), 0.0, BodyTwist(), covariance, covariance)
+        return WheelWay(np.zeros(3), np.zeros(3), self._still, self._still)
 
-    def _grip(self, way_m: float, turned_rad: float) -> F64:
-        """Counting, and a geometry that is not quite right."""
-        s = self._settings
-        covariance: F64 = self._counting.copy()
-        way, yaw = (s.way_scale_std * way_m) ** 2 + LEAST, (s.yaw_scale_std * turned_rad) ** 2 + LEAST
-        covariance[0, 0] += way
-        covariance[1, 1] += way
-        covariance[2, 2] += yaw
-        return covariance
 
-    def _slipping(self, grip: F64, way_m: float, turned_rad: float) -> F64:
-        """And slip, which grows with the way and with the turn."""
-        s, covariance = self._settings, grip.copy()
-        position = s.position_variance_m2_per_m * way_m + s.position_variance_m2_per_rad * turned_rad
-        covariance[0, 0] += position
-        covariance[1, 1] += position
-        covariance[2, 2] += s.yaw_variance_rad2_per_m * way_m + s.yaw_variance_rad2_per_rad * turned_rad
-        return covariance
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _way(columns: F64, turns: F64, rates: F64, elapsed_s: float, counting: F64, trust: Trust) -> tuple[F64, F64, F64, F64]:
+    """Return what a `WheelWay` holds of turns and rates, both of shape (wheels,)."""
+    vector, twist = columns @ turns, columns @ rates  # of the tangent: (3,), (3,)
+    dx, dy, turned = vector
+    if abs(turned) > PARALLEL:
+        a, b = np.sin(turned) / turned, (1.0 - np.cos(turned)) / turned
+        vector[0], vector[1] = a * dx - b * dy, b * dx + a * dy
+    way_m, angle = np.hypot(dx, dy), abs(turned)
+    grip = counting.copy()
+    way_error = (trust.way_scale_std * way_m) ** 2 + LEAST
+    yaw_error = (trust.yaw_scale_std * angle) ** 2 + (trust.yaw_std_rad_per_m * way_m) ** 2
+    grip[0, 0] += way_error
+    grip[1, 1] += way_error
+    grip[2, 2] += yaw_error + LEAST
+    covariance = grip.copy()
+    slip = trust.position_variance_m2_per_m * way_m + trust.position_variance_m2_per_rad * angle
+    covariance[0, 0] += slip
+    covariance[1, 1] += slip
+    covariance[2, 2] += trust.yaw_variance_rad2_per_m * way_m + trust.yaw_variance_rad2_per_rad * angle
+    covariance[2, 2] += yaw_error * max(0.0, trust.systematic_s / elapsed_s - 1.0)
+    return vector, twist, covariance, grip
