@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,17 +12,12 @@ from drivers.interface.errors import ConfigurationError
 from drivers.interface.geometry import SE2
 from drivers.interface.links import Links
 from drivers.interface.mission import Goal, Mission
-from estimators.estimator import Estimator, EstimatorSetup
-from planners.planner import Planner, PlannerSetup
-from planners.router import Router, RouterSetup
-from planners.shield import Shield, ShieldSetup
 from runtime.configuration import Configuration
-from runtime.fault_board import FaultBoard
 from runtime.mission import MissionTracker
 from runtime.pacer import Pacer
-from runtime.planning import PlannerRunner
+from runtime.parts import Parts, build_parts
+from runtime.planning import Ready, as_it_stands, awaited
 from runtime.robot import Devices, Robot
-from runtime.supervisor import Supervisor, SupervisorSetup
 from sim_drivers.scene import Scene
 from sim_drivers.world import MujocoWorld
 
@@ -38,20 +34,11 @@ class Assembly:
     robot: Robot
     mission: MissionTracker
     time_limit_s: float
-    estimator: Estimator
-    router: Router
-    planner: Planner
-    runner: PlannerRunner
-    shield: Shield
-    supervisor: Supervisor
-    board: FaultBoard
+    parts: Parts
 
     def warm_up(self) -> None:
         """Compile every kernel, so that none is compiled inside a tick; a paced world has not moved on meanwhile."""
-        self.estimator.warm_up()
-        self.router.warm_up()
-        self.planner.warm_up()
-        self.shield.warm_up()
+        self.parts.warm_up()
         if isinstance(self.clock, PacedClock):
             self.clock.begin()
 
@@ -82,24 +69,17 @@ def assemble(configuration: Configuration, seed: int) -> Assembly:
         ConfigurationError: parts that do not fit together; the sentence says which.
     """
     scene = draw_scene(configuration, seed)
-    here = configuration.emulation is None  # else the world lives in `trundle emulate`; the scene is drawn all the same
-    world = MujocoWorld(scene, configuration.world.common) if here and scene and configuration.world else None
-    devices, clock, lockstep = _devices(configuration, seed, world)
-    mission = MissionTracker(_mission(configuration, scene))
-    board = FaultBoard()
-    period_s = configuration.loop.period_ns * 1e-9
-    radius_m = configuration.robot.radius_m
-    limits = devices.base.limits if devices.base else None
-    kinematics = devices.base.kinematics if devices.base else None
-    arm_limits = devices.arm.limits if devices.arm else None
+    world = _world(configuration, scene)
+    clocks: list[Clock] = []
 
-    planning = configuration.planner
-    estimator_setup = EstimatorSetup(period_s, radius_m, mission.mission.map_from_start, kinematics)
-    plan_period_s = period_s * planning.common.period_ticks
-    planner = planning.choice.build(PlannerSetup(plan_period_s, radius_m, limits, seed, arm_limits))
-    shield = configuration.shield.build(ShieldSetup(period_s, radius_m, limits))
-    budget_ns = configuration.loop.period_ns if planning.common.budget_ms is None else round(planning.common.budget_ms * 1e6)
-    supervisor_setup = SupervisorSetup(period_s, limits, budget_ns, devices.operator is not None, arm_limits)
+    def now_ns() -> int:  # the clock needs the compiled world, and that needs the devices first
+        return clocks[0].now_ns()
+
+    devices = _devices(configuration, seed, world, now_ns)
+    clock, lockstep = _clock(configuration, world)
+    clocks.append(clock)
+    mission = MissionTracker(_mission(configuration, scene))
+    ready = awaited if lockstep else as_it_stands
     return Assembly(
         configuration=configuration,
         scene=scene,
@@ -109,20 +89,19 @@ def assemble(configuration: Configuration, seed: int) -> Assembly:
         robot=Robot(devices, mission),
         mission=mission,
         time_limit_s=_time_limit(configuration, scene),
-        estimator=configuration.estimator.build(estimator_setup),
-        router=configuration.router.build(RouterSetup(period_s, radius_m)),
-        planner=planner,
-        runner=PlannerRunner(
-            planner,
-            board,
-            period_ticks=planning.common.period_ticks,
-            latency_ticks=planning.common.latency_ticks,
-            lockstep=lockstep,
-        ),
-        shield=shield,
-        supervisor=Supervisor(configuration.supervisor, supervisor_setup, shield, board),
-        board=board,
+        parts=build_parts(configuration, seed, devices, mission.mission.map_from_start, ready),
     )
+
+
+def assemble_recorded(configuration: Configuration, seed: int, ready: Ready) -> Parts:
+    """Build the parts that decide for a robot whose devices are only asked what they are: no world, no clock, nothing opened.
+
+    Raises:
+        ConfigurationError: parts that do not fit together; the sentence says which.
+    """
+    scene = draw_scene(configuration, seed)
+    devices = _devices(configuration, seed, _world(configuration, scene), lambda: 0)
+    return build_parts(configuration, seed, devices, _mission(configuration, scene).map_from_start, ready)
 
 
 def draw_scene(configuration: Configuration, seed: int) -> Scene | None:
@@ -134,26 +113,31 @@ def draw_scene(configuration: Configuration, seed: int) -> Scene | None:
     return scene if start is None else replace(scene, map_from_start=SE2(start.x_m, start.y_m, start.yaw_rad))
 
 
-def _devices(configuration: Configuration, seed: int, world: MujocoWorld | None) -> tuple[Devices, Clock, bool]:
-    clocks: list[Clock] = []
+def _world(configuration: Configuration, scene: Scene | None) -> MujocoWorld | None:
+    """Return the world, not yet compiled; None where there is none, or where it lives in `trundle emulate`."""
+    if scene is None or configuration.world is None or configuration.emulation is not None:
+        return None
+    return MujocoWorld(scene, configuration.world.common)
 
-    def now_ns() -> int:  # the clock needs the compiled world, and that needs the devices first
-        return clocks[0].now_ns()
 
+def _devices(configuration: Configuration, seed: int, world: MujocoWorld | None, now_ns: Callable[[], int]) -> Devices:
     built: dict[str, Any] = {}
     links = Links()
     for name, choice in configuration.devices:
         built[name] = choice.build(DeviceSetup(name, seed, now_ns, world, links))
+    return Devices(**built)
+
+
+def _clock(configuration: Configuration, world: MujocoWorld | None) -> tuple[Clock, bool]:
+    """Return the clock and whether it is in lockstep; the world, which has all its devices now, is compiled."""
     # A driver that lives in real time (a device, a keyboard) says so with a class attribute.
     live = [name for name, choice in configuration.devices if getattr(choice.cls, "real_time", False)]
     realtime = configuration.loop.realtime or bool(live) or configuration.emulation is not None
     if world is None:
-        clocks.append(RealClock() if realtime else SimClock())
-    else:
-        world.compile()
-        _check_period(configuration, world)
-        clocks.append(PacedClock(world, world.step_ns) if realtime else SimClock(world))
-    return Devices(**built), clocks[0], not realtime
+        return (RealClock() if realtime else SimClock()), not realtime
+    world.compile()
+    _check_period(configuration, world)
+    return (PacedClock(world, world.step_ns) if realtime else SimClock(world)), not realtime
 
 
 def _check_period(configuration: Configuration, world: MujocoWorld) -> None:

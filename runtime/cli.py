@@ -16,6 +16,7 @@ from runtime.commands.doctor import doctor
 from runtime.commands.emulate import emulate
 from runtime.commands.evaluate import evaluate
 from runtime.commands.listing import list_
+from runtime.commands.replay import replay
 from runtime.commands.review import review
 from runtime.commands.run import run
 from runtime.commands.schema import schema
@@ -37,6 +38,7 @@ app.command(name="list")(list_)
 app.command()(schema)
 app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(log.app, name="log")
+app.command()(replay)
 app.command()(review)
 
 

@@ -139,6 +139,21 @@ def load(name_or_path: str, overrides: tuple[str, ...] = ()) -> Configuration:
     return _Reader(str(path)).configuration(content)
 
 
+def load_effective(text: str, source: str, changes: yaml_files.Mapping) -> Configuration:
+    """Load what `as_yaml` gave, with whole or part sections laid over it.
+
+    Raises:
+        ConfigurationError: with the source, the key and the valid choices.
+    """
+    try:
+        content = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise ConfigurationError(f"{source}: the configuration in it is damaged") from error
+    if not isinstance(content, dict):
+        raise ConfigurationError(f"{source}: there is no configuration in it")
+    return _Reader(source).configuration(content | changes)
+
+
 def _whole_robot(path: Path, robot: Any) -> yaml_files.Mapping:
     """Return the robot's mapping, whether it stands there, is named, or extends a named one."""
     if isinstance(robot, str):

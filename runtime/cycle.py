@@ -23,6 +23,7 @@ class Verdict:
     faults: tuple[FaultReport, ...]
     reachable: ReachableSet
     filtered: Filtered | None  # what the shield made of it; None when it was not consulted
+    given: tuple[FaultReport, ...] = ()  # of the faults, those that nothing sensed leads to: an input of the tick
 
 
 @dataclass(frozen=True, slots=True)

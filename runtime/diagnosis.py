@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from drivers.interface.commands import BaseLimits
 from drivers.interface.sensed import Sensed
@@ -12,9 +12,18 @@ from runtime.fault_board import FaultBoard
 from runtime.faults import Fault, FaultReport, Response
 from runtime.operator_state import OperatorState
 from runtime.sections import DeadlineLadder, SupervisorSection
-from runtime.watch import DeviceWatch
+from runtime.watch import DeviceWatch, WatchState
 
 _NO_MOTION = 1e-6  # m/s: what a planner's rounding may leave on an axis that the base does not have
+
+
+@dataclass(frozen=True, slots=True)
+class DiagnosisState:
+    """What a diagnosis goes on from."""
+
+    latched: FaultReport | None
+    misses: int
+    watch: WatchState
 
 
 class Diagnosis:
@@ -38,6 +47,15 @@ class Diagnosis:
         if sensed.truth is not None and sensed.truth.contacts:
             faults.append(FaultReport(Fault.COLLISION, "truth", f"it touches {', '.join(sensed.truth.contacts)}"))
         return self._with_latched(faults, reset=operator.reset)
+
+    @property
+    def state(self) -> DiagnosisState:
+        """What it goes on from."""
+        return DiagnosisState(self._latched, self._misses, self._watch.state)
+
+    @state.setter
+    def state(self, state: DiagnosisState) -> None:
+        self._latched, self._misses, self._watch.state = state.latched, state.misses, state.watch
 
     def _of_plan(self, plan: Plan) -> list[FaultReport]:
         twist = plan.base

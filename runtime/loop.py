@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from drivers.interface.commands import Command
@@ -12,7 +12,6 @@ from estimators.belief import Belief
 from planners.planner import Plan
 from planners.router import Route
 from runtime.cycle import Cycle, Verdict
-from runtime.pacer import Pacer
 from runtime.stopwatch import Stopwatch
 
 
@@ -42,7 +41,7 @@ class Stages:
         )
 
 
-def run_loop(pacer: Pacer, stages: Stages, stopwatch: Stopwatch, is_over: Callable[[Cycle], bool]) -> None:
+def run_loop(pacer: Iterable[Tick], stages: Stages, stopwatch: Stopwatch, is_over: Callable[[Cycle], bool]) -> None:
     """Run until `is_over` says so."""
     do = stages.timed(stopwatch)
     for tick in pacer:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future
+from dataclasses import dataclass
 
 from estimators.belief import Belief
 from planners.planner import Plan, Planner
@@ -14,6 +15,33 @@ from runtime.faults import Fault, FaultReport
 from runtime.guards import checked, report
 
 NO_PLAN = Plan(base=None)
+Ready = Callable[[int, Future[Plan]], bool]  # tick and plan to whether it counts as finished at that tick
+
+
+@dataclass(frozen=True, slots=True)
+class RunnerState:
+    """What a runner goes on from while no plan is in the making, the planner's own state aside."""
+
+    next_tick: int
+    plan: Plan
+
+
+@dataclass(frozen=True, slots=True)
+class Checkpoint:
+    """The whole of it."""
+
+    state: RunnerState
+    planner: bytes  # its snapshot
+
+
+def awaited(tick: int, plan: Future[Plan]) -> bool:
+    """Say that a plan that is due is finished: whoever asks for it waits."""
+    return True
+
+
+def as_it_stands(tick: int, plan: Future[Plan]) -> bool:
+    """Say whether a plan that is due is finished."""
+    return plan.done()
 
 
 class PlannerRunner:
@@ -23,21 +51,25 @@ class PlannerRunner:
     lockstep the loop waits for it, in real time a plan that is not ready then is a fault and the robot stands down.
     """
 
-    def __init__(self, planner: Planner, board: FaultBoard, *, period_ticks: int, latency_ticks: int, lockstep: bool) -> None:
-        """Take the planner; nothing is called yet."""
+    def __init__(self, planner: Planner, board: FaultBoard, *, period_ticks: int, latency_ticks: int, ready: Ready) -> None:
+        """Take the planner, and what tells whether its plans are ready in time; nothing is called yet."""
         self._planner = planner
         self._board = board
         self._period = period_ticks
         self._latency = latency_ticks
-        self._lockstep = lockstep
+        self._ready = ready
         self._next_tick = 0
         self._plan = NO_PLAN
         self._pending: tuple[int, Future[Plan]] | None = None
         self._background = Background[Plan]("planner") if latency_ticks else None
+        self._asked = False
+        self.checkpoint: Checkpoint | None = None  # taken at the last `plan` that came after `ask_checkpoint`
 
     def plan(self, belief: Belief, route: Route) -> Plan:
         """Return the plan in force at this tick."""
         self._collect(belief.tick)
+        if self._asked:
+            self._asked, self.checkpoint = False, self._checkpoint()
         if belief.tick >= self._next_tick and self._pending is None:
             self._next_tick = belief.tick + self._period
             if self._background is None:
@@ -46,18 +78,37 @@ class PlannerRunner:
                 self._pending = belief.tick + self._latency, self._background.submit(lambda: self._planner.plan(belief, route))
         return self._plan
 
+    def is_idle_at(self, tick: int) -> bool:
+        """Whether no plan is in the making once those due at a tick have been collected."""
+        return self._pending is None or self._pending[0] <= tick
+
+    def ask_checkpoint(self) -> None:
+        """Have a checkpoint taken at the next tick, between two plans: only there does nobody else use the planner."""
+        self._asked, self.checkpoint = True, None
+
+    def restore(self, checkpoint: Checkpoint) -> None:
+        """Go on from a checkpoint; the next call of `plan` is that of its tick."""
+        self._planner.restore(checkpoint.planner)
+        self._next_tick, self._plan, self._pending = checkpoint.state.next_tick, checkpoint.state.plan, None
+
     def close(self) -> None:
         """Let go of the background thread without waiting for a planner that hangs."""
         if self._background is not None:
             self._background.close()
 
+    def _checkpoint(self) -> Checkpoint | None:
+        """Return what to go on from; None while a plan is in the making."""
+        if self._pending is not None:
+            return None
+        return Checkpoint(RunnerState(self._next_tick, self._plan), self._planner.snapshot())
+
     def _collect(self, tick: int) -> None:
         if self._pending is None or tick < self._pending[0]:
             return
         due, future = self._pending
-        if not self._lockstep and not future.done():
+        if not self._ready(tick, future):
             late = f"the plan begun {tick - due + self._latency} ticks ago is not ready"
-            self._board.post(FaultReport(Fault.PLANNER_OVER_BUDGET, "planner", late))
+            self._board.post(FaultReport(Fault.PLANNER_OVER_BUDGET, "planner", late), given=True)
             return
         self._pending = None
         self._plan = self._guarded(future.result)

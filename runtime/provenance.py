@@ -6,7 +6,6 @@ import time
 from importlib import resources
 
 from drivers.interface.geometry import SE2, SE3
-from runtime.assembly import Assembly
 from runtime.configuration import Choice, Configuration
 from runtime.doctor.findings import recent_examination
 from runtime.log.header import ArmShape, RunHeader, SceneShape, code_version, library_versions, machine
@@ -14,9 +13,9 @@ from runtime.log.urdf import links_of
 from sim_drivers.scene import Scene, Shape
 
 
-def run_header(assembly: Assembly, seed: int) -> RunHeader:
+def run_header(configuration: Configuration, scene: Scene | None, seed: int) -> RunHeader:
     """Return the header of a run that is about to begin."""
-    configuration, (version, modified) = assembly.configuration, code_version()
+    version, modified = code_version()
     return RunHeader(
         configuration_yaml=configuration.as_yaml(),
         seed=seed,
@@ -26,8 +25,8 @@ def run_header(assembly: Assembly, seed: int) -> RunHeader:
         robot_height_m=configuration.robot.height_m,
         devices=tuple(name for name, _ in configuration.devices),
         arm=_arm(configuration),
-        static=() if assembly.scene is None else _static(assembly.scene),
-        movers=() if assembly.scene is None else _moving(assembly.scene),
+        static=() if scene is None else _static(scene),
+        movers=() if scene is None else _moving(scene),
         code_version=version,
         code_modified=modified,
         libraries=library_versions(),

@@ -14,10 +14,10 @@ from runtime.configuration import Configuration
 from runtime.cycle import Cycle
 from runtime.fault_board import FaultBoard
 from runtime.faults import Fault, FaultReport
-from runtime.guards import guarded_route, guarded_update
 from runtime.interrupt import Interrupts, Phase, interruptible
+from runtime.keyframes import KeyFrames
 from runtime.log.recorder import Recorder, RecorderReport
-from runtime.loop import Stages, run_loop
+from runtime.loop import run_loop
 from runtime.pacer import Pacer
 from runtime.provenance import run_header
 from runtime.realtime import realtime
@@ -59,7 +59,11 @@ def run(configuration: Configuration, options: RunOptions) -> RunResult:
         assembly = assemble(configuration, options.seed)
         assembly.warm_up()
         recorder = Recorder(
-            options.log, configuration.log, run_header(assembly, options.seed), lockstep=assembly.lockstep, live=options.live
+            options.log,
+            configuration.log,
+            run_header(assembly.configuration, assembly.scene, options.seed),
+            lockstep=assembly.lockstep,
+            live=options.live,
         )
         return _Run(assembly, options, recorder, interrupts).result()
 
@@ -79,7 +83,7 @@ class _Run:
     def result(self) -> RunResult:
         failure: BaseException | None = None
         with ExitStack() as closing:
-            closing.callback(self._assembly.runner.close)
+            closing.callback(self._assembly.parts.runner.close)
             closing.callback(self._let_go)
             self._assembly.robot.open()  # before the recorder: a device that is not there leaves no empty log behind
             closing.callback(self._recorder.close)
@@ -122,15 +126,8 @@ class _Run:
         required = assembly.configuration.log.on_unwritable == "stop"
         unwritable = Fault.REQUIRED_LOG_UNWRITABLE if required else Fault.LOG_UNWRITABLE
         pacer.measured_plan_ns = self._stopwatch.plan_ns
-        stages = Stages(
-            sense=assembly.robot.read,
-            estimate=guarded_update(assembly.estimator, assembly.board),
-            route=guarded_route(assembly.router, assembly.board),
-            plan=assembly.runner.plan,
-            admit=assembly.supervisor.admit,
-            write=assembly.robot.write,
-            record=recording(self._recorder, assembly.board, unwritable),
-        )
+        recorded = recording(self._recorder, self._key_frames(), assembly.parts.board, unwritable)
+        stages = assembly.parts.stages(assembly.robot.read, assembly.robot.write, recorded)
         with realtime(assembly.configuration.loop.system) as self._refused:
             self._options.ready(assembly)
             start_s = time.perf_counter()
@@ -138,6 +135,11 @@ class _Run:
                 run_loop(pacer, stages, self._stopwatch, referee.is_over)
             finally:
                 self._wall_s = time.perf_counter() - start_s
+
+    def _key_frames(self) -> KeyFrames | None:
+        """Return what takes key frames; None where nothing is recorded."""
+        interval_s = self._assembly.configuration.log.keyframe_interval_s
+        return None if self._options.log is None else KeyFrames(self._assembly.parts, interval_s)
 
     def _report(self, pacer: Pacer, referee: Referee, recorded: RecorderReport, failure: BaseException | None) -> RunReport:
         assembly, tally = self._assembly, referee.tally
@@ -176,14 +178,14 @@ def _error(failure: BaseException | None) -> str:
     return str(failure) if isinstance(failure, TrundleError) else f"{type(failure).__name__}: {failure}"
 
 
-def recording(recorder: Recorder, board: FaultBoard, unwritable: Fault) -> Callable[[Cycle], None]:
-    """Return `recorder.record` that leaves word on the fault board when the log has become unwritable."""
+def recording(recorder: Recorder, key_frames: KeyFrames | None, board: FaultBoard, unwritable: Fault) -> Callable[[Cycle], None]:
+    """Return `recorder.record` that adds the key frames and leaves word on the fault board when the log has become unwritable."""
 
     def record(cycle: Cycle) -> None:
-        recorder.record(cycle)
+        recorder.record(cycle, None if key_frames is None else key_frames.after(cycle))
         sentence = recorder.fault()
         if sentence:
-            board.post(FaultReport(unwritable, "recorder", sentence))
+            board.post(FaultReport(unwritable, "recorder", sentence), given=True)
 
     return record
 
@@ -199,6 +201,10 @@ def _figures(path: Path | None, recorded: RecorderReport, duration_s: float) -> 
         bytes=recorded.bytes_written,
         bytes_per_s=recorded.bytes_written / duration_s if duration_s else 0.0,
         queue_high_water=recorded.queue_high_water,
+        files=len(recorded.files),
+        deleted_files=recorded.deleted_files,
+        longest_sync_s=recorded.longest_sync_s,
+        incidents=tuple(str(path) for path in recorded.incidents),
         fault=recorded.fault,
     )
 

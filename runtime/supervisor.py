@@ -10,7 +10,7 @@ from estimators.belief import Belief
 from planners.planner import Plan
 from planners.shield import Filtered, ReachableSet, Shield
 from runtime.cycle import Verdict
-from runtime.diagnosis import Diagnosis, worst
+from runtime.diagnosis import Diagnosis, DiagnosisState, worst
 from runtime.fault_board import FaultBoard
 from runtime.faults import Fault, FaultReport, Response
 from runtime.guards import checked, report
@@ -33,6 +33,16 @@ class SupervisorSetup:
     arm_limits: JointLimits | None = None  # None: a robot without an arm
 
 
+@dataclass(frozen=True, slots=True)
+class SupervisorState:
+    """What a supervisor goes on from, the shield's own state aside."""
+
+    operator: OperatorState
+    motion: Motion
+    last: Command
+    diagnosis: DiagnosisState
+
+
 class Supervisor:
     """Admits commands.  Whatever it is given, it returns a finite command inside the limits that expires."""
 
@@ -41,6 +51,7 @@ class Supervisor:
         self._settings = settings
         self._setup = setup
         self._shield = shield
+        self._board = board
         self._diagnosis = Diagnosis(settings, setup.limits, setup.plan_budget_ns, board)
         self._limiter = None if setup.limits is None else Limiter(setup.limits, setup.period_s)
         self._arm_at_rest = None if setup.arm_limits is None else JointTrajectory.rest()
@@ -58,7 +69,17 @@ class Supervisor:
         filtered = self._shielded(asked, belief, reachable, faults)
         command = self._checked(self._responding(worst(faults), asked, filtered, sensed), sensed, faults)
         self._remember(command)
-        return Verdict(command, asked, worst(faults), tuple(faults), reachable, filtered)
+        return Verdict(command, asked, worst(faults), tuple(faults), reachable, filtered, self._board.given)
+
+    @property
+    def state(self) -> SupervisorState:
+        """What it goes on from; it can be set."""
+        return SupervisorState(self._operator, self._motion, self._last, self._diagnosis.state)
+
+    @state.setter
+    def state(self, state: SupervisorState) -> None:
+        self._operator, self._motion, self._last = state.operator, state.motion, state.last
+        self._diagnosis.state = state.diagnosis
 
     def _resume_from(self, belief: Belief, sensed: Sensed) -> None:
         """After the last command has expired the base stands or brakes by itself: go on from what it really does."""

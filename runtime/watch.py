@@ -15,6 +15,25 @@ SECOND_NS = 1_000_000_000
 RATE_WINDOW_NS = 2 * SECOND_NS
 
 
+@dataclass(frozen=True, slots=True)
+class SeenState:
+    """What is remembered of one device, at rest."""
+
+    device: str
+    newest: Stamp | None
+    expired_commands: int
+    arrivals_ns: tuple[int, ...]
+    arrivals: tuple[int, ...]  # samples at each
+
+
+@dataclass(frozen=True, slots=True)
+class WatchState:
+    """What a device watch goes on from."""
+
+    start_ns: int | None
+    seen: tuple[SeenState, ...]
+
+
 @dataclass(slots=True)
 class _Seen:
     """What is remembered of one device."""
@@ -47,6 +66,16 @@ class DeviceWatch:
             if health.device in stamps and health.expected_period_ns and health.state is not DeviceState.ENDED:
                 found += self._from_samples(health, stamps[health.device], seen, now_ns)
         return found
+
+    @property
+    def state(self) -> WatchState:
+        """What it goes on from."""
+        return WatchState(self._start_ns, tuple(_at_rest(device, seen) for device, seen in self._seen.items()))
+
+    @state.setter
+    def state(self, state: WatchState) -> None:
+        self._start_ns = state.start_ns
+        self._seen = {rest.device: _awake(rest) for rest in state.seen}
 
     def _from_health(self, health: DeviceHealth, seen: _Seen) -> list[FaultReport]:
         found = []
@@ -103,6 +132,16 @@ class DeviceWatch:
         if ratio >= self._settings.lowest_rate_ratio:
             return []
         return [FaultReport(Fault.WRONG_RATE, health.device, f"{100 * ratio:.0f} % of its rate over two seconds")]
+
+
+def _at_rest(device: str, seen: _Seen) -> SeenState:
+    times, counts = zip(*seen.arrivals, strict=True) if seen.arrivals else ((), ())
+    return SeenState(device, seen.newest, seen.expired_commands, times, counts)
+
+
+def _awake(rest: SeenState) -> _Seen:
+    arrivals = deque(zip(rest.arrivals_ns, rest.arrivals, strict=True))
+    return _Seen(rest.newest, rest.expired_commands, arrivals, sum(rest.arrivals))
 
 
 def _stamps(sensed: Sensed) -> dict[str, tuple[Stamp, ...]]:

@@ -35,13 +35,18 @@ def consumed_schemas(images: bool = True) -> dict[str, Schema]:
     return {f.name: Schema(f"/replay/sensed/{f.name}", _CONSUMED[f.name], images) for f in fields(Sensed)}
 
 
+def decided_schemas() -> dict[str, Schema]:
+    """Return the columns of what the loop decided, by the fields of `Cycle`."""
+    return {name: Schema(f"/replay/{name}", hint) for name, hint in _DECIDED.items()}
+
+
 class ExactPart:
     """Takes cycles apart into columns."""
 
     def __init__(self, images: bool) -> None:
         """Record depth images, or leave them out (the log can then not be replayed)."""
         self._consumed = consumed_schemas(images)
-        self._decided = {name: Schema(f"/replay/{name}", hint) for name, hint in _DECIDED.items()}
+        self._decided = decided_schemas()
         self._lost: list[int] = []
 
     def put(self, cycle: Cycle, lost_before: int) -> None:

@@ -6,13 +6,16 @@ import enum
 import math
 import zlib
 from collections.abc import Callable, Iterator
-from dataclasses import fields
+from dataclasses import fields, make_dataclass
+from functools import cache
 from itertools import islice
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.interface.samples import frozen_array
+from planners.planner import Diagnostics
 from runtime.log.columns import Column
 from runtime.log.nodes import Put, Row
 
@@ -63,7 +66,7 @@ class Array:
         """Return the array."""
         shape = tuple(islice(row[self._shape.name], next(row[self._shape.name])))
         elements = list(islice(row[self._elements.name], math.prod(shape)))
-        return np.array(elements, np.float64).reshape(shape)
+        return frozen_array(np.array(elements, np.float64).reshape(shape))
 
 
 class Image:
@@ -76,7 +79,7 @@ class Image:
 
     def take(self, row: Row) -> NDArray[np.uint16]:
         """Return the image, shape (height, width)."""
-        return np.asarray(next(row[self._name]), np.uint16)
+        return frozen_array(np.asarray(next(row[self._name]), np.uint16))
 
 
 class Digest:
@@ -95,8 +98,8 @@ class Digest:
         self._append(self._crc)
 
     def take(self, row: Row) -> Any:
-        """Raise TypeError: a CRC cannot be turned back."""
-        raise TypeError(f"the log holds only a checksum of {self._name}")
+        """Return the CRC in place of the array, which cannot be had back."""
+        return next(row[self._name])
 
 
 class Said:
@@ -117,9 +120,18 @@ class Said:
                 self._columns[key] = self._new_column(*key)
             self._columns[key].values.append(part)
 
-    def take(self, row: Row) -> Any:
-        """Raise TypeError: their class may not be installed where the log is read."""
-        raise TypeError(f"the log holds {self._name.name} for comparison only")
+    def take(self, row: Row) -> Diagnostics:
+        """Return diagnostics that say the same, in a class of the same name: theirs may not be installed here."""
+        prefix = self._name.name.removesuffix("type")
+        told = {name.removeprefix(prefix): cells for name, cells in row.items() if name.startswith(prefix)}
+        kind = next(told.pop("type"))
+        values = {name.removesuffix(".text"): next(cells) for name, cells in told.items()}
+        return _class_of(kind, tuple(values))(**values)
+
+
+@cache
+def _class_of(name: str, fields_: tuple[str, ...]) -> type[Diagnostics]:
+    return make_dataclass(name, fields_, bases=(Diagnostics,), frozen=True)
 
 
 def said(diagnostics: Any) -> Iterator[tuple[str, float | str]]:

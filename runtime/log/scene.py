@@ -49,8 +49,8 @@ def layers(header: RunHeader, settings: LogSettings) -> list[Layer[Any]]:
         Layer(_depth_unit, Rows(DEPTH, _depth_scales, _depth_style()), EQUAL),
         Layer(lambda c: c.belief.grid, Rows(f"{ODOM}/grid", grid_columns), IDENTICAL, often),
         Layer(lambda c: c.belief.clearance, Rows(f"{ODOM}/clearance", clearance_columns), IDENTICAL, often),
-        Layer(lambda c: c.route.path_in_odom, _path(f"{ODOM}/route", colours.ROUTE, 0.012), IDENTICAL, often),
-        Layer(lambda c: c.plan.path_in_odom, _path(f"{ODOM}/plan", colours.ASKED, 0.02), IDENTICAL, often),
+        Layer(lambda c: c.route.path_in_odom, path(f"{ODOM}/route", colours.ROUTE, 0.012), IDENTICAL, often),
+        Layer(lambda c: c.plan.path_in_odom, path(f"{ODOM}/plan", colours.ASKED, 0.02), IDENTICAL, often),
         Layer(lambda c: c.sensed.mission.goals, _goals(f"{MAP}/goals"), EQUAL),
         Layer(lambda c: c.belief.map_from_base, _dots(f"{MAP}/trail", colours.SENT)),
         Layer(_truth, _dots(f"{MAP}/truth", colours.TRUTH)),
@@ -122,7 +122,9 @@ def _dots(entity: str, colour: colours.Rgb) -> Rows[SE2]:
     return Rows(entity, columns, [(entity, rr.Points3D.from_fields(colors=[colour], radii=[0.015]))])
 
 
-def _path(entity: str, colour: colours.Rgb, radius_m: float) -> Rows[NDArray[np.float64]]:
+def path(entity: str, colour: colours.Rgb, radius_m: float) -> Rows[NDArray[np.float64]]:
+    """Return rows of paths in the entity's frame, each shape (n, 2) [m]."""
+
     def columns(paths: list[NDArray[np.float64]]) -> rr.ComponentColumnList:
         return rr.LineStrips3D.columns(strips=[np.c_[path, np.full(len(path), _PATH_Z_M)] for path in paths])
 

@@ -44,7 +44,7 @@ class Schema:
         Raises:
             ValueError: cells are missing.
         """
-        row: dict[str, Iterator[Any]] = {name: iter(cells.get(name, ())) for name in self.columns}
+        row = _Row((name, iter(values)) for name, values in cells.items())
         try:
             return self._root.take(row)
         except (StopIteration, RuntimeError) as error:  # RuntimeError: a StopIteration inside a generator
@@ -110,6 +110,14 @@ class Schema:
             return self._column(_join(_join(name, field), "text"), Kind.TEXT)
 
         return column
+
+
+class _Row(dict[str, Iterator[Any]]):
+    """The cells of one tick; a column that has none is empty."""
+
+    def __missing__(self, name: str) -> Iterator[Any]:
+        """Return no values."""
+        return iter(())
 
 
 def _join(path: str, name: str) -> str:

@@ -48,7 +48,7 @@ class Bench:
         def plan(belief: Belief, route: Route) -> Plan:
             return Plan(base=self.base, arm=self.ask(belief))
 
-        self.assembly, assembly.planner.plan = assembly, plan
+        self.assembly, assembly.parts.planner.plan = assembly, plan
 
     def run(self, name: str, *changes: str, seconds: float) -> RunReport:
         settings = configuration.load(name, (*changes, f"mission.time_limit_s={seconds}"))

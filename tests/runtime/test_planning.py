@@ -9,7 +9,7 @@ from planners.planner import Plan, no_path
 from planners.router import Route
 from runtime.fault_board import FaultBoard
 from runtime.faults import Fault
-from runtime.planning import NO_PLAN, PlannerRunner
+from runtime.planning import NO_PLAN, PlannerRunner, as_it_stands, awaited
 from tests.runtime.cycles import belief
 
 ROUTE = Route(None, no_path(), 0.0)
@@ -39,7 +39,7 @@ def speeds(runner: PlannerRunner, ticks: range) -> list[float | None]:
 
 
 def runner(planner: Counting, board: FaultBoard, period: int = 1, latency: int = 0, lockstep: bool = True) -> PlannerRunner:
-    return PlannerRunner(planner, board, period_ticks=period, latency_ticks=latency, lockstep=lockstep)
+    return PlannerRunner(planner, board, period_ticks=period, latency_ticks=latency, ready=awaited if lockstep else as_it_stands)
 
 
 def test_every_third_tick_is_planned_and_the_plan_stays_in_force_between() -> None:

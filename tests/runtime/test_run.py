@@ -28,7 +28,9 @@ def drive(name: str, *changes: str, seed: int = 0, **options: object) -> RunRepo
 
 
 def but_for_times(report: RunReport) -> RunReport:
-    recording = report.recording and replace(report.recording, path="", bytes=0, bytes_per_s=0.0, queue_high_water=0)
+    recording = report.recording and replace(
+        report.recording, path="", bytes=0, bytes_per_s=0.0, queue_high_water=0, longest_sync_s=0.0
+    )
     return replace(report, stage_ms={}, realtime_factor=0.0, recording=recording)
 
 
@@ -65,12 +67,12 @@ class Watcher:
         self.cycles: list[Cycle] = []
 
     def ready(self, assembly: Assembly) -> None:
-        plan = assembly.planner.plan
+        plan = assembly.parts.planner.plan
 
         def broken(belief: Belief, route: Route) -> Plan:
             return self.breaking(belief.tick) or plan(belief, route)
 
-        assembly.planner.plan = broken
+        assembly.parts.planner.plan = broken
 
     def update(self, cycle: Cycle) -> None:
         self.cycles.append(cycle)
@@ -204,7 +206,7 @@ def test_a_log_that_cannot_be_written_is_what_the_configuration_makes_of_it(wish
 
 def test_an_estimator_that_fails_at_the_first_tick_ends_the_run_in_order(tmp_path: Path) -> None:
     def ready(assembly: Assembly) -> None:
-        assembly.estimator.update = lambda sensed: 1 / 0
+        assembly.parts.estimator.update = lambda sensed: 1 / 0
 
     options = run.RunOptions(ready=ready, log=tmp_path / "a.rrd")
     result = run.run(configuration.load("static_corridor"), options)

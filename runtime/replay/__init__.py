@@ -1,0 +1,1 @@
+"""Runs the loop again over a recording, and says whether it comes to the same."""
