@@ -12,7 +12,6 @@ from runtime.assembly import draw_scene
 from runtime.configuration import Configuration
 from runtime.interrupt import Phase, interruptible
 from runtime.realtime import realtime
-from runtime.sections import RealtimeSection
 from sim_drivers.firmware.firmware import Firmware, FirmwareSetup
 from sim_drivers.world import SECOND_NS, MujocoWorld
 
@@ -153,7 +152,7 @@ def emulate(
         over = False
         while not over:
             emulation = build(configuration, seed)
-            with opened(emulation), realtime(RealtimeSection()):
+            with opened(emulation), realtime(configuration.loop.system):
                 worlds += 1
                 interrupts.phase = Phase.DRIVING
                 emulation.run.start()
