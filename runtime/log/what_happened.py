@@ -34,7 +34,7 @@ def layout(header: RunHeader) -> rrb.Horizontal:
 
 def _scene(header: RunHeader) -> rrb.Spatial3DView:
     contents = [f"{scene.MAP}/**", scene.DEPTH, f"- {scene.ODOM}/clearance", f"- {scene.MAP}/truth"]
-    eye = _BEHIND if "base" in header.devices else _BESIDE
+    eye = _BESIDE if header.arm is not None and "base" not in header.devices else _BEHIND
     return views.scene("Scene", scene.MAP, contents, scene.FOCUS, eye, [f"{scene.MAP}/trail"])
 
 
