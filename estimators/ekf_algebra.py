@@ -38,17 +38,28 @@ class Algebra(ExtendedKalmanFilter):  # type: ignore[misc]  # FilterPy is untype
         """Return mean and covariance after a measurement of a part of the state."""
         self.x, self.P, rows = state.x, state.covariance, _IDENTITY[measured]
         self.update(innovation, lambda _: rows, lambda _: 0.0, R=noise)
-        return self.x, 0.5 * (self.P + self.P.T)
+        return self.x, symmetric(self.P)
+
+    def warm_up(self) -> None:
+        """Compile what stands beside FilterPy."""
+        symmetric(_IDENTITY)
 
     def weight(self, state: EkfState, innovation: F64, measured: slice, noise: F64) -> float:
         """Return how far a measurement of a part of the state is believed: 1 within the gate, less beyond it, 0 far beyond it."""
-        surprise = squared_surprise(innovation, state.covariance[measured, measured] + noise)
+        surprise = squared_surprise(innovation, state.covariance, measured.start, noise)
         if surprise <= self._gate:
             return 1.0
         return self._gate / surprise if surprise <= self._gate * self._skip_ratio else 0.0
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def squared_surprise(innovation: F64, scatter: F64) -> float:
-    """Return the normalised innovation squared of an innovation, shape (m,), with its covariance, shape (m, m)."""
+def squared_surprise(innovation: F64, covariance: F64, first: int, noise: F64) -> float:
+    """Return the normalised innovation squared of three states from the `first` on, measured with a noise of shape (3, 3)."""
+    scatter = covariance[first : first + 3, first : first + 3] + noise
     return float(innovation @ np.linalg.solve(scatter, innovation))
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def symmetric(matrix: F64) -> F64:
+    """Return the symmetric part of a square matrix."""
+    return 0.5 * (matrix + matrix.T)

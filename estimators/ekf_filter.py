@@ -6,16 +6,16 @@ import math
 
 import numpy as np
 
-from drivers.interface.geometry import SE2, wrap_angle
+from drivers.interface.geometry import wrap_angle
 from drivers.interface.kinematics import WheelKinematics
 from drivers.interface.samples import ImuSample, PoseSample, WheelSample
 from estimators.ekf_algebra import Algebra, squared_surprise
-from estimators.ekf_model import BIASES, GYRO_BIAS, POSE, STATES, VELOCITY, WAY, YAW, Inertial, transition
+from estimators.ekf_model import BIASES, GYRO_BIAS, POSE, STATES, VELOCITY, WAY, YAW, Inertial, transition, without_way
 from estimators.ekf_settings import EkfSettings
 from estimators.ekf_state import EkfState
-from estimators.odometry import SECOND_NS, is_plausible
+from estimators.odometry import SECOND_NS
 from estimators.odometry_limits import MotionLimits
-from estimators.wheel_way import WheelModel, WheelWay
+from estimators.wheel_way import WheelModel, WheelWay, farthest
 
 Sample = ImuSample | WheelSample | PoseSample
 VELOCITY_STD_M_S = 0.5  # of a velocity of which nothing is known
@@ -44,7 +44,10 @@ class MotionFilter:
 
     def warm_up(self) -> None:
         """Compile the motion model and the gate."""
-        squared_surprise(np.zeros(3), np.eye(3))
+        squared_surprise(np.zeros(3), np.eye(STATES), POSE.start, np.eye(3))
+        without_way(np.zeros(STATES), np.eye(STATES))
+        farthest(np.zeros(3), np.zeros(3))
+        self._algebra.warm_up()
         if self._wheels is not None:
             self._wheels.warm_up()
         transition(np.zeros(STATES), Inertial(0.0, 0.0, 0.0, True, 1.0, 1.0), self._walk_std, 0.01)
@@ -120,9 +123,10 @@ class MotionFilter:
         return state.gyro_ns is not None and time_ns - state.gyro_ns <= self._settings.gap_max_s * SECOND_NS
 
     def _plausible(self, way: WheelWay, elapsed_s: float) -> bool:
-        limits = self._limits.speed_max_m_s, self._limits.turn_rate_max_rad_s
-        turned, reported = SE2(*way.vector.tolist()), SE2(*way.twist.tolist())
-        return is_plausible(turned, elapsed_s, *limits) and is_plausible(reported, 1.0, *limits)
+        speed_max, rate_max = self._limits.speed_max_m_s, self._limits.turn_rate_max_rad_s
+        (dx, dy, turned), (vx, vy, wz) = way.vector.tolist(), way.twist.tolist()
+        moves = math.hypot(dx, dy) <= speed_max * elapsed_s and abs(turned) <= rate_max * elapsed_s
+        return moves and math.hypot(vx, vy) <= speed_max and abs(wz) <= rate_max
 
     def _held(self, state: EkfState, time_ns: int) -> EkfState:
         """Carry a state on with what the inertial unit said last."""
@@ -155,14 +159,12 @@ class MotionFilter:
 
     def _anchored(self, state: EkfState, sample: WheelSample) -> EkfState:
         """Count the way anew from this sample."""
-        x, covariance = state.x.copy(), state.covariance.copy()
-        x[WAY] = 0.0
-        covariance[WAY] = covariance[:, WAY] = 0.0
+        x, covariance = without_way(state.x, state.covariance)
         captured_ns, angles = sample.stamp.captured_ns, sample.position_rad.copy()
         state = state._replace(x=x, covariance=covariance, wheels_ns=captured_ns, wheels_rad=angles)
         if state.still_rad is None:  # a robot that is switched on stands, until its wheels say otherwise
             return state._replace(still_ns=captured_ns - round(self._settings.still_after_s * SECOND_NS), still_rad=angles)
-        if np.abs(angles - state.still_rad).max() > self._settings.still_rad:
+        if farthest(angles, state.still_rad) > self._settings.still_rad:
             return state._replace(still_ns=captured_ns, still_rad=angles)
         return state
 

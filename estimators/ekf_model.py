@@ -81,3 +81,13 @@ def transition(x: F64, inertial: Inertial, walk_std: F64, dt_s: float) -> tuple[
             jacobian[:, bias] = 0.0
             jacobian[bias, bias] = 1.0
     return after, jacobian, noise
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def without_way(x: F64, covariance: F64) -> tuple[F64, F64]:
+    """Return state and covariance with a way that begins here, certain to be none: (11,), (11, 11)."""
+    x, covariance = x.copy(), covariance.copy()
+    x[WAY_X:] = 0.0
+    covariance[WAY_X:, :] = 0.0
+    covariance[:, WAY_X:] = 0.0
+    return x, covariance

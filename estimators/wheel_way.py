@@ -100,3 +100,12 @@ def _way(columns: F64, turns: F64, rates: F64, elapsed_s: float, counting: F64, 
     covariance[2, 2] += trust.yaw_variance_rad2_per_m * way_m + trust.yaw_variance_rad2_per_rad * angle
     covariance[2, 2] += yaw_error * max(0.0, trust.systematic_s / elapsed_s - 1.0)
     return vector, twist, covariance, grip
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def farthest(one: F64, other: F64) -> float:
+    """Return by how much the wheel that differs most differs, both of shape (wheels,)."""
+    most = 0.0
+    for i in range(len(one)):
+        most = max(most, abs(one[i] - other[i]))
+    return most
