@@ -59,11 +59,13 @@ def load_evaluation(name_or_path: str, seeds: int | None, changes: tuple[str, ..
     from runtime.experiment import RunsEvaluation  # noqa: PLC0415 - each kind knows this contract
     from runtime.odometry_evaluation import OdometryEvaluation  # noqa: PLC0415
     from runtime.perception_evaluation import PerceptionEvaluation  # noqa: PLC0415
+    from runtime.registration_evaluation import RegistrationEvaluation  # noqa: PLC0415
 
     kinds: dict[str, type[Evaluation]] = {
         "runs": RunsEvaluation,
         "odometry": OdometryEvaluation,
         "perception": PerceptionEvaluation,
+        "registration": RegistrationEvaluation,
     }
     path = yaml_files.find(name_or_path, "experiments")
     content = yaml_files.read(path, "experiments")

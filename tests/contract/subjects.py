@@ -22,6 +22,7 @@ VARIANTS: dict[str, tuple[dict[str, Any], ...]] = {
         {"source": "scan", "odometry": {"kind": "ekf"}},
         {"pose": "truth", "tracks": "truth"},
         {"memory": {"kind": "layers"}, "depth": {"filtered": True}, "tracks": "grid"},
+        {"registration": {"enabled": True}},
     ),
 }
 NAN, INF = math.nan, math.inf
