@@ -49,10 +49,11 @@ class Task:
 class Shell:
     """Runs one session until the lifeline ends."""
 
-    def __init__(self, task: Task, channels: Channels, lifeline: socket.socket) -> None:
+    def __init__(self, task: Task, channels: Channels, lifeline: socket.socket, bell: int) -> None:
         """Take over where an earlier child stopped: its counters, its records, the orders it saw."""
         self._channels = channels
-        self._lifeline = lifeline
+        self._lifeline = lifeline.fileno()
+        self._bell = bell
         self._health = channels.health.read()
         self._health.fault, self._health.state = "", DeviceState.RECONNECTING
         self._port = Port(task.name, channels.rings, channels.frames, self._health, task.generation > 0)
@@ -107,10 +108,10 @@ class Shell:
     def _wait(self, seconds: float, descriptors: tuple[int, ...] = ()) -> bool:
         """Wait for the wire, a new order or so much time; return whether the runtime still wants us."""
         wait_s = min(max(seconds, 0.0), HEARTBEAT_S)
-        lifeline = self._lifeline.fileno()
-        readable, _, _ = select.select((lifeline, *descriptors), (), (), wait_s)
-        if lifeline in readable:
-            self._alive = len(self._lifeline.recv(4096)) > 0  # rings are only to wake us; many may have come at once
+        readable, _, _ = select.select((self._lifeline, self._bell, *descriptors), (), (), wait_s)
+        if self._bell in readable:
+            os.eventfd_read(self._bell)
+        self._alive = self._lifeline not in readable
         return self._alive
 
     def _lose(self, error: Exception) -> None:
@@ -150,7 +151,7 @@ class Shell:
             self._published = (now_ns, health.state, health.fault, health.resets_done)
 
 
-def main(lifeline_fd: int, memory_fd: int) -> None:
+def main(lifeline_fd: int, memory_fd: int, bell_fd: int) -> None:
     """Be the child: take the task, work, and leave with the runtime."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the runtime's; it tells us
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
@@ -164,7 +165,7 @@ def main(lifeline_fd: int, memory_fd: int) -> None:
     os.close(memory_fd)
     code = 0
     try:
-        Shell(task, channels, lifeline).run()
+        Shell(task, channels, lifeline, bell_fd).run()
     except SystemExit:
         pass
     except BaseException:  # noqa: BLE001 - the process ends with it; whoever looks for the bug needs to see where it was

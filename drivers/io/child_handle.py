@@ -1,4 +1,4 @@
-"""A running child: its process, and the lifeline that wakes it and whose end it takes for the end of the runtime."""
+"""A running child: its process, and the lifeline, a socket whose end it takes for the end of the runtime."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ import threading
 
 from drivers.io.child import LAST_WORDS_S, Task
 
-_PROGRAM = "import sys; sys.path[:] = sys.argv[3:]; from drivers.io.child import main; main(int(sys.argv[1]), int(sys.argv[2]))"
+_PROGRAM = "import sys; sys.path[:] = sys.argv[4:]; from drivers.io.child import main; main(*map(int, sys.argv[1:4]))"
 
 
 class ChildHandle:
     """Starts the child, and ends it."""
 
-    def __init__(self, task: Task, memory: int) -> None:
-        """Start it with the memory behind a file descriptor.  A fresh interpreter: nothing of the runtime is copied into it.
+    def __init__(self, task: Task, memory: int, bell: int) -> None:
+        """Start it with the descriptors of memory and bell.  A fresh interpreter: nothing of the runtime is copied into it.
 
         Raises:
             OSError: the system refused.
         """
         self._lifeline, theirs = socket.socketpair()
         try:
-            inherited = (theirs.fileno(), memory)
+            inherited = (theirs.fileno(), memory, bell)
             self._process = subprocess.Popen(
                 [sys.executable, "-c", _PROGRAM, *map(str, inherited), *sys.path],
                 stdin=subprocess.DEVNULL,
@@ -36,7 +36,6 @@ class ChildHandle:
             )
             body = pickle.dumps(task)
             self._lifeline.sendall(struct.pack("<I", len(body)) + body)
-            self._lifeline.setblocking(False)
         except BaseException:
             self._lifeline.close()
             raise
@@ -47,13 +46,6 @@ class ChildHandle:
     def pid(self) -> int:
         """Its process id."""
         return self._process.pid
-
-    def wake(self) -> None:
-        """Let it look at the memory now; costs one system call."""
-        try:
-            self._lifeline.send(b"\0")
-        except OSError:  # it is gone, or has more to hear than it can: it will look anyway
-            return
 
     def ended(self, seconds: float, closing: threading.Event) -> bool:
         """Wait at most so long; return whether it has ended by itself."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import time
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -51,6 +52,7 @@ class IoProcess:
         self._closing = threading.Event()
         self._reset = threading.Event()
         self._child: ChildHandle | None = None
+        self._bell = -1  # an eventfd: unlike a socket or a pipe it does not pull the one who is woken onto the waker's core
         self._word: tuple[DeviceState, str] | None = None  # the host's own, where the child cannot speak
         self._open = False
 
@@ -64,6 +66,7 @@ class IoProcess:
         spec = self._spec
         size = Channels(spec.memory, None).size
         memory = allocate(size)
+        self._bell = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._channels = Channels.shared(spec.memory, memory, size)
         self._closing, self._reset, self._word = threading.Event(), threading.Event(), None
         self._thread = threading.Thread(target=self._supervise, args=(memory, size), name=f"{spec.name} io", daemon=True)
@@ -136,10 +139,12 @@ class IoProcess:
             self._closing.set()
             self._reset.set()
             thread.join()
+            os.close(self._bell)
 
     def _ring_the_bell(self) -> None:
-        if (child := self._child) is not None:
-            child.wake()
+        """Let the child look at the memory now."""
+        with suppress(BlockingIOError):  # it has not listened for 2^64 - 2 rings
+            os.eventfd_write(self._bell, 1)
 
     def _await_open(self) -> None:
         spec, deadline_s = self._spec, time.monotonic() + self._spec.open_s
@@ -174,7 +179,7 @@ class IoProcess:
     def _run_child(self, task: Task, memory: int, backoff: Backoff) -> str:
         """Start a child, watch it to its end and return what happened."""
         try:
-            child = self._child = ChildHandle(task, memory)
+            child = self._child = ChildHandle(task, memory, self._bell)
         except OSError as error:
             return f"its process could not be started: {error}"
         try:

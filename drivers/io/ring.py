@@ -52,7 +52,8 @@ class SharedRing:
             return self._slots[:0].copy()
         first = max(self._read, done - self._capacity)
         fence()
-        copied = self._slots[np.arange(first, done) % self._capacity]
+        begin, end = first % self._capacity, (done - 1) % self._capacity + 1
+        copied = self._slots[begin:end].copy() if begin < end else np.concatenate((self._slots[begin:], self._slots[:end]))
         fence()
         intact = min(max(first, self._words[1] - self._capacity), done)
         self.overflowed += intact - self._read

@@ -6,7 +6,6 @@ import math
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.interface.commands import BaseLimits, BodyTwist
 from drivers.interface.devices import DeviceHealth, DeviceIdentity, DeviceSetup
@@ -85,7 +84,10 @@ class OmniCanBase:
         if not len(records):
             return ()
         offset_ns = self._clock.offset_ns()
-        return tuple(self._sample(record, offset_ns) for record in records)
+        captured_ns, received_ns = ((records[name] + offset_ns).tolist() for name in ("captured_ns", "received_ns"))
+        stamps = map(Stamp, captured_ns, received_ns, records["sequence"].tolist())
+        position, velocity = (frozen_array(records[name] / self._motor_from_wheel) for name in ("turns", "turns_s"))  # (n, 3)
+        return tuple(map(WheelSample, stamps, position, velocity))
 
     def stop(self) -> None:
         """Brake to rest."""
@@ -120,16 +122,6 @@ class OmniCanBase:
         """Return firmware and protocol, once the axes have been heard."""
         record = self._io.health()
         return DeviceIdentity(self._setup.name, "ODrive, three axes", record.firmware, record.protocol)
-
-    def _sample(self, record: np.void, offset_ns: int) -> WheelSample:
-        stamp = Stamp(int(record["captured_ns"]) + offset_ns, int(record["received_ns"]) + offset_ns, int(record["sequence"]))
-        position, velocity = (_wheels(record[name], self._motor_from_wheel) for name in ("turns", "turns_s"))
-        return WheelSample(stamp, position, velocity)
-
-
-def _wheels(motor: NDArray[np.float64], motor_from_wheel: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return wheel angles or rates [rad, rad/s] for those of the motors [turn, turn/s], both (3,)."""
-    return frozen_array(motor / motor_from_wheel)
 
 
 def _known(value: float) -> float | None:
