@@ -14,6 +14,7 @@ from drivers.interface.errors import ConfigurationError, TrundleError
 from runtime.commands import calibrate, log
 from runtime.commands.doctor import doctor
 from runtime.commands.emulate import emulate
+from runtime.commands.compare import compare
 from runtime.commands.evaluate import evaluate
 from runtime.commands.listing import list_
 from runtime.commands.replay import replay
@@ -40,6 +41,7 @@ app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(log.app, name="log")
 app.command()(replay)
 app.command()(review)
+app.command()(compare)
 
 
 @app.callback()

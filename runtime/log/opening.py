@@ -10,7 +10,7 @@ from rerun.chunk import Chunk, RrdReader
 from rerun.error_utils import RerunWarning
 
 from drivers.interface.errors import ConfigurationError
-from runtime.log.sink import APPLICATION
+from runtime.log.recording import APPLICATION
 
 
 def require_log(path: Path) -> None:

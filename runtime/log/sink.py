@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import fcntl
 import os
-import socket
 import threading
 from collections.abc import Iterable
 from pathlib import Path
@@ -19,12 +18,11 @@ from pathlib import Path
 import rerun as rr
 import rerun.blueprint as rrb
 
-from drivers.interface.errors import ConfigurationError
 from runtime.log.columns import ArrowColumn
+from runtime.log.live import LiveView
+from runtime.log.recording import new_recording
 
-APPLICATION = "trundle"
 _PIPE_BYTES = 1 << 20
-_LIVE_MEMORY = "64MiB"  # what a viewer that joins late still gets to see
 
 
 class LogFile:
@@ -95,19 +93,11 @@ class Sink:
             OSError: the file cannot be created.
             ConfigurationError: the port of the live view is taken.
         """
-        rr.set_strict_mode(True)
-        self._stream = rr.RecordingStream(APPLICATION, send_properties=False)
-        self._stream.set_log_time_enabled(False)
-        self._stream.set_log_tick_enabled(False)
-        sinks: list[rr.GrpcServerSink | rr.FileSink] = []
-        if live_port is not None:
-            _require_free(live_port)
-            sinks.append(rr.GrpcServerSink(bind_ip="127.0.0.1", port=live_port, server_memory_limit=_LIVE_MEMORY))
+        self._stream = new_recording()
+        self._live = LiveView(live_port, blueprint) if live_port is not None else None
         self._file = LogFile(path) if path is not None else None
         if self._file is not None:
-            sinks.append(rr.FileSink(self._file.inlet, write_footer=False))
-        self._stream.set_sinks(*sinks, default_blueprint=blueprint)
-        if self._file is not None:
+            self._stream.set_sinks(rr.FileSink(self._file.inlet, write_footer=False), default_blueprint=blueprint)
             self._file.release_inlet()
 
     @property
@@ -122,11 +112,18 @@ class Sink:
 
     def log_static(self, entity: str, *parts: rr.AsComponents) -> None:
         """Log what holds for the whole run."""
-        self._stream.log(entity, *parts, static=True)
+        if self._file is not None:
+            self._stream.log(entity, *parts, static=True)
+        if self._live is not None:
+            self._live.log(entity, *parts, static=True)
 
     def send(self, entity: str, index: Iterable[ArrowColumn], columns: Iterable[rr.ComponentColumn | ArrowColumn]) -> None:
         """Send a batch of columns."""
-        self._stream.send_columns(entity, index, columns)
+        times, values = tuple(index), tuple(columns)
+        if self._file is not None:
+            self._stream.send_columns(entity, times, values)
+        if self._live is not None:
+            self._live.send_columns(entity, times, values)
 
     def flush(self, timeout_s: float) -> bool:
         """Push everything sent so far out to the file; return whether that was done in time."""
@@ -138,17 +135,10 @@ class Sink:
 
     def close(self, timeout_s: float) -> None:
         """Finish the file; one that cannot be finished in time is given up, with a fault."""
+        if self._live is not None:
+            self._live.close()
         if self._file is not None and not self.flush(timeout_s):
             self._file.abandon()
         self._stream.disconnect()
         if self._file is not None and not self._file.finish(timeout_s):
             self._file.abandon()
-
-
-def _require_free(port: int) -> None:
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind(("127.0.0.1", port))
-        except OSError as error:
-            raise ConfigurationError(f"log.live_port {port} is taken; choose another with --set log.live_port=N") from error
