@@ -7,6 +7,7 @@ from itertools import count
 from pathlib import Path
 
 from drivers.interface.errors import ConfigurationError
+from runtime.log.paths import files_of, stem_of
 
 LOGS = Path("runs")
 
@@ -17,13 +18,31 @@ def log_path(asked: Path | None, stem: str, *, force: bool) -> Path:
     Raises:
         ConfigurationError: it is no .rrd file, exists while `force` is not given, or cannot be written.
     """
-    path = asked or next(p for n in count() if not (p := LOGS / f"{stem}-{n:03d}.rrd").exists())
+    path = asked or next(p for n in count() if not _existing(p := LOGS / f"{stem}-{n:03d}.rrd"))
     if path.suffix != ".rrd":
         raise ConfigurationError(f"--log takes a file that ends in .rrd, as the viewer does; not {path}")
-    if path.exists() and not force:
-        raise ConfigurationError(f"--log {path} exists already; --force overwrites it")
+    if stem_of(path) != path:
+        raise ConfigurationError(f"--log {path} ends like one of several files of a log; choose a name without that number")
+    existing = _existing(path)
+    if existing and not force:
+        raise ConfigurationError(f"--log {existing[0]} exists already; --force overwrites it")
     require_writable(path, "--log")
+    for file in existing:
+        if file != path:  # the writer overwrites that one itself
+            _delete(file)
     return path
+
+
+def _existing(path: Path) -> tuple[Path, ...]:
+    """Return the files of a log that is there already."""
+    return tuple(file for file in files_of(path) if file.exists())
+
+
+def _delete(file: Path) -> None:
+    try:
+        file.unlink()
+    except OSError as error:
+        raise ConfigurationError(f"--log cannot overwrite {file}: {error.strerror}") from error
 
 
 def require_writable(path: Path | None, option: str) -> None:

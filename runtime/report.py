@@ -47,6 +47,10 @@ class RecordingFigures:
     bytes: int
     bytes_per_s: float  # per second of the run's own time
     queue_high_water: int
+    files: int  # that it consists of
+    deleted_files: int  # to keep the disk budget
+    longest_sync_s: float  # that something written waited until it was on the disk
+    incidents: tuple[str, ...]  # recordings made of latched stops
     fault: str
 
 
@@ -100,6 +104,7 @@ class RunReport:
         if self.recording is not None:
             size = f"{self.recording.path} ({self.recording.bytes / 1e6:.1f} MB)"
             rows.append(("recording", f"{size}; {self.recording.fault}" if self.recording.fault else size))
+            rows += [("stop recorded", path) for path in self.recording.incidents]
         if self.error:
             rows.append(("ended by", self.error))
         for name, value in rows:

@@ -14,6 +14,7 @@ from drivers.interface.geometry import SE2, SE3
 from runtime.log.urdf import Link
 
 SCHEMA_VERSION = 1  # of the replay columns; raised when a reader of the old ones would misread the new
+READABLE_SCHEMAS = (1,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +55,7 @@ class RunHeader:
     code_modified: bool = False
     libraries: tuple[str, ...] = ()  # "name version"
     machine: str = ""
+    doctor: str = ""  # what `trundle doctor --json` had to say, as it was given to the run
 
 
 def code_version() -> tuple[str, bool]:
@@ -77,5 +79,18 @@ def library_versions() -> tuple[str, ...]:
 
 
 def machine() -> str:
-    """Return processor architecture, system and Python of this machine."""
-    return f"{platform.machine()} {platform.system()} {platform.release()} python {platform.python_version()}"
+    """Return processor, system and Python of this machine: on another processor the last bits of a result may differ."""
+    system = f"{platform.machine()} {platform.system()} {platform.release()} python {platform.python_version()}"
+    return f"{processor()}; {system}"
+
+
+def processor() -> str:
+    """Return the processor's model as the system names it, else its architecture."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:  # not Linux
+        return platform.processor() or platform.machine()
+    found = dict(line.split(":", 1) for line in lines if ":" in line)
+    named = {key.strip(): value.strip() for key, value in found.items()}
+    arm = " ".join(named[key] for key in ("CPU implementer", "CPU part", "CPU variant", "CPU revision") if key in named)
+    return named.get("model name") or named.get("Model") or arm or platform.machine()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
+from rerun.chunk import Chunk
 
 from runtime.log import rvl
 from runtime.log.columns import IMAGE_COMPONENT
 from runtime.log.events import EVENTS
 from runtime.log.exact import CHECK
-from runtime.log.opening import chunks
+from runtime.log.opening import chunks, chunks_of_file
 
 _NOT_CONTENT = ("/timing", "/run")
 STATIC = -1  # stands for the tick of what holds for the whole run
@@ -49,19 +50,32 @@ class Log:
 
 
 def read(path: Path, content: str = "/**") -> Log:
-    """Read a log, or only the entities that match `content`.
+    """Read a log, or all its files, or only the entities that match `content`.
 
     Raises:
-        ConfigurationError: the file is missing, empty, cut, or not a log of ours.
+        ConfigurationError: a file is missing, empty, cut, or not a log of ours.
     """
+    return _gathered(path, chunks(path, content))
+
+
+def read_file(file: Path, content: str) -> Log:
+    """Read one file of a log.
+
+    Raises:
+        ConfigurationError: it is damaged.
+    """
+    return _gathered(file, chunks_of_file(file, content))
+
+
+def _gathered(path: Path, pieces: Iterable[Chunk]) -> Log:
     entities: dict[str, dict[str, dict[int, Cell]]] = {}
-    for chunk in chunks(path, content):
+    for chunk in pieces:
         batch = chunk.to_record_batch()
         times = next((c.to_pylist() for name, c in _columns(batch, b"index") if name == "tick"), [STATIC] * batch.num_rows)
         for name, column in _columns(batch, b"data"):
             held = entities.setdefault(chunk.entity_path, {}).setdefault(name, {})
             for tick, cell in _cells(times, column):
-                held[tick] = _joined(held[tick], cell) if tick in held else cell
+                held[tick] = _joined(held[tick], cell) if tick in held and tick != STATIC else cell
     return Log(path, {entity: _ordered(entities[entity]) for entity in sorted(entities)})
 
 

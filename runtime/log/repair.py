@@ -6,9 +6,12 @@ import os
 import subprocess
 from importlib.util import find_spec
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from drivers.interface.errors import ConfigurationError
-from runtime.log.opening import require_log
+from runtime.log.marks import END, SEGMENT
+from runtime.log.opening import require_log, require_recording
+from runtime.log.paths import files_of, stem_of
 
 
 def rerun_program() -> str:
@@ -28,18 +31,37 @@ def quiet_environment() -> dict[str, str]:
     return os.environ | {"CI": "1"}
 
 
-def repair(damaged: Path, repaired: Path) -> None:
-    """Write all whole messages of a damaged log to another file, which must not exist.
+def repair(damaged: Path, repaired: Path | None = None) -> Path:
+    """Write all whole messages of a damaged log, or of all its files, to one other file; return its path.
+
+    Without a path it is `NAME.repaired.rrd`, beside the log.
 
     Raises:
-        ConfigurationError: nothing can be saved, or the other file exists.
+        ConfigurationError: nothing can be saved, or the other file exists or cannot be written.
     """
-    if repaired.exists():
-        raise ConfigurationError(f"{repaired} exists already; nothing is overwritten")
-    command = [rerun_program(), "rrd", "optimize", "--continue-on-error", str(damaged), "-o", str(repaired)]
-    subprocess.run(command, env=quiet_environment(), capture_output=True, check=False)
-    try:
-        require_log(repaired)
-    except ConfigurationError as error:
-        repaired.unlink(missing_ok=True)
-        raise ConfigurationError(f"nothing of {damaged} can be saved") from error
+    path = repaired or stem_of(damaged).with_suffix(".repaired.rrd")
+    if path.exists():
+        raise ConfigurationError(f"{path} exists already; nothing is overwritten")
+    if path.suffix != ".rrd":
+        raise ConfigurationError(f"--output takes a file that ends in .rrd, as the viewer does; not {path}")
+    files = files_of(damaged)
+    for file in files:
+        require_recording(file)
+    with TemporaryDirectory(dir=_folder(path), prefix=".repair-") as folder:
+        saved = Path(folder) / path.name
+        # The marks of the files speak of others, and of bytes that are no longer the same.
+        options = ["--continue-on-error", "--drop-entity", END, "--drop-entity", SEGMENT, "-o", str(saved)]
+        command = [rerun_program(), "rrd", "filter", *map(str, files), *options]
+        subprocess.run(command, env=quiet_environment(), capture_output=True, check=False)  # failed: there is no output
+        try:
+            require_log(saved)
+        except ConfigurationError as error:
+            raise ConfigurationError(f"nothing of {damaged} can be saved") from error
+        saved.rename(path)
+    return path
+
+
+def _folder(path: Path) -> Path:
+    if not os.access(path.parent, os.W_OK):
+        raise ConfigurationError(f"{path} cannot be written: there is no such folder, or no permission")
+    return path.parent

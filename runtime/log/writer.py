@@ -7,18 +7,22 @@ from pathlib import Path
 from typing import Protocol
 
 import rerun as rr
+import rerun.blueprint as rrb
 
 from runtime.cycle import Cycle
+from runtime.keyframes import KeyFrame
 from runtime.log import plots, scene, timing
 from runtime.log.columns import ArrowColumn, timelines
 from runtime.log.events import Events
 from runtime.log.exact import ExactPart
 from runtime.log.header import SCHEMA_VERSION, RunHeader
+from runtime.log.keyframes import KeyFramePart
 from runtime.log.layout import layout
+from runtime.log.live import LiveView
+from runtime.log.marks import END, SEGMENT, End, Segment
+from runtime.log.opening import RUN
 from runtime.log.settings import LogSettings
 from runtime.log.sink import Sink
-
-RUN = "/run"
 
 
 class Drawn(Protocol):
@@ -36,31 +40,45 @@ class Drawn(Protocol):
 class Writer:
     """Collects ticks and sends them as columns."""
 
-    def __init__(self, path: Path | None, settings: LogSettings, header: RunHeader, live_port: int | None) -> None:
-        """Open the sink and log what holds for the whole run.
+    def __init__(
+        self,
+        path: Path | None,
+        settings: LogSettings,
+        header: RunHeader,
+        live: LiveView | None,
+        segment: Segment = Segment(),  # noqa: B008 - frozen
+        *,
+        blueprint: rrb.Blueprint | None = None,
+        beside: tuple[Drawn, ...] = (),
+    ) -> None:
+        """Open the sink and log what holds for the whole run; draw also what stands `beside`, in a layout made for it.
 
         Raises:
             OSError: the file cannot be created.
-            ConfigurationError: the port of the live view is taken.
         """
-        self._sink = Sink(path, live_port, layout(header))
+        self._sink = Sink(path, live, blueprint or layout(header), settings.flush_interval_s, segment.recording_id)
+        self._put_ticks = 0
         self._exact = ExactPart(settings.depth)
+        self._key_frames = KeyFramePart()
         self._drawn: tuple[Drawn, ...] = (
             *scene.layers(header, settings),
             *plots.layers(header),
             plots.Diagnosed(plots.PLANNER, plots.planner_diagnostics),
             plots.Diagnosed(plots.SHIELD, plots.shield_diagnostics),
             Events(),
+            *beside,
         )
         self._timed: tuple[Drawn, ...] = (*timing.layers(), timing.DevicePlots())
         self._queue = timing.Queue()
-        self._draw_interval_ns = round(1e9 * (settings.draw_interval_s if live_port is None else settings.flush_interval_s))
+        self._draw_interval_ns = round(1e9 * (settings.draw_interval_s if live is None else settings.flush_interval_s))
         self._draw_due_ns = 0
         self._ticks: list[int] = []
         self._starts_ns: list[int] = []
         self._sink.log_static(RUN, _provenance(header, settings))
+        self._sink.log_static(SEGMENT, segment.as_components())
         for entity, archetype in scene.static(header):
             self._sink.log_static(entity, archetype)
+        self._sink.flush(settings.flush_interval_s)  # a file says first what it is
 
     @property
     def fault(self) -> str:
@@ -72,13 +90,21 @@ class Writer:
         """Size of the file so far."""
         return self._sink.bytes_written
 
-    def put(self, cycle: Cycle, *, drawn: bool, lost_before: int, waiting: int = 0) -> None:
+    @property
+    def longest_sync_s(self) -> float:
+        """For how long something that was written waited at most until it was on the disk."""
+        return self._sink.longest_sync_s
+
+    def put(self, cycle: Cycle, *, drawn: bool, lost_before: int, waiting: int = 0, key_frame: KeyFrame | None = None) -> None:
         """Add a tick to the batch, handed over when `waiting` others were; one that is not drawn has only its exact part and
         what tells why it was late.
         """
         self._ticks.append(cycle.sensed.tick.index)
         self._starts_ns.append(cycle.sensed.tick.start_ns)
+        self._put_ticks += 1
         self._exact.put(cycle, lost_before)
+        if key_frame is not None:
+            self._key_frames.put(key_frame, len(self._ticks) - 1)
         self._queue.put(cycle, waiting, lost_before)
         for timed in self._timed:
             timed.put(cycle)
@@ -90,7 +116,7 @@ class Writer:
         """Send the batch and start a new one; what is drawn goes out less often, as a batch costs much and a row little."""
         if not self._ticks:
             return
-        for batch in tuple(self._exact.batches()):  # built as a whole before any of it is sent
+        for batch in (*self._key_frames.batches(), *self._exact.batches()):  # built as a whole before any of it is sent
             self._sink.send(batch.entity, self._index(batch.rows or range(len(self._ticks))), batch.columns)
         now_ns = self._starts_ns[-1]
         self._ticks.clear()
@@ -112,9 +138,13 @@ class Writer:
         """Push what was sent out to the file; return whether that was done in time."""
         return self._sink.flush(timeout_s)
 
-    def close(self, timeout_s: float) -> None:
-        """Finish the file."""
-        self._sink.close(timeout_s)
+    def close(self, timeout_s: float, *, last: bool | None = None) -> None:
+        """Finish the file: the last of its log, or one that others follow; None: one whose log has failed, which has no end."""
+        if last is None:
+            self._sink.close(timeout_s)
+            return
+        self.send_drawn()
+        self._sink.close(timeout_s, END, lambda size, crc32: End(self._put_ticks, last, size, crc32).as_components())
 
 
 def _provenance(header: RunHeader, settings: LogSettings) -> rr.AnyValues:
@@ -129,4 +159,5 @@ def _provenance(header: RunHeader, settings: LogSettings) -> rr.AnyValues:
         code_modified=header.code_modified,
         libraries=list(header.libraries),
         machine=header.machine,
+        doctor=header.doctor,
     )

@@ -1,8 +1,5 @@
-import subprocess
-import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 import rerun as rr
 
@@ -21,31 +18,6 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("log") / "a.rrd"
     record(path, CYCLES)
     return path
-
-
-def damaged_copies(log: Path, folder: Path, count: int) -> list[Path]:
-    """Copies with one bit flipped each, somewhere after the first quarter."""
-    paths = []
-    for seed in range(count):
-        content = bytearray(log.read_bytes())
-        at = int(np.random.default_rng(seed).integers(len(content) // 4, len(content)))
-        content[at] ^= 1 << seed % 8
-        paths.append(folder / f"{seed}.rrd")
-        paths[-1].write_bytes(content)
-    return paths
-
-
-def test_a_flipped_bit_is_an_error_or_named_but_never_silently_other_data(log: Path, tmp_path: Path) -> None:
-    left, verdicts = damaged_copies(log, tmp_path, 12), []
-    while left:
-        command = [sys.executable, "-m", "tests.runtime.read_damaged", log, *left]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
-        said = done.stdout.splitlines()
-        ended_early = done.returncode != 0  # Rerun's reader ended the process: noticed
-        verdicts += said + ["noticed or harmless"] * ended_early
-        left = left[len(said) + ended_early :]
-        assert said or done.returncode < 0, done.stderr
-    assert verdicts == ["noticed or harmless"] * 12
 
 
 def test_the_words_tell_what_happened_and_when_it_was_over(log: Path) -> None:
@@ -78,7 +50,7 @@ def test_what_is_no_log_of_ours_is_refused_with_one_sentence(tmp_path: Path, use
     foreign(other)
     expected = {
         tmp_path / "none.rrd": f"there is no log {tmp_path / 'none.rrd'}",
-        tmp_path: f"there is no log {tmp_path}",
+        tmp_path: f"there is no log {tmp_path}: it is a folder",
         empty: f"the log {empty} is empty",
         text: f"{text} is not a Rerun recording",
         other: f"{other} was not recorded by trundle but by somebody_else",
@@ -105,5 +77,5 @@ def test_a_repair_never_overwrites_and_says_when_nothing_is_left(log: Path, tmp_
     with pytest.raises(ConfigurationError, match="exists already"):
         repair(log, log)
     (tmp_path / "text.rrd").write_text("not a recording")
-    with pytest.raises(ConfigurationError, match=r"nothing of .* can be saved"):
+    with pytest.raises(ConfigurationError, match=r"text\.rrd is not a Rerun recording"):
         repair(tmp_path / "text.rrd", tmp_path / "b.rrd")

@@ -32,7 +32,7 @@ def record(path: Path, cycles: list[Cycle], **settings: object) -> RecorderRepor
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("log") / "a.rrd"
-    assert record(path, CYCLES) == RecorderReport(60, 0, 0, path.stat().st_size, 60, "")
+    assert record(path, CYCLES) == RecorderReport(60, 0, 0, path.stat().st_size, 60, (path,))
     return path
 
 
