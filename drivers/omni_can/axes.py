@@ -58,6 +58,7 @@ class Axes:
         self._wire = wire
         self._missed = [0] * len(settings.node_ids)  # believed encoder frames since the last sample, of each axis
         self._sequence = self._ring.written
+        self._newest_ns = -1  # when the last sample was captured
         self.load = LoadMeter(settings.bit_rate)
         self.firmware = next(iter(settings.codecs)) if len(settings.codecs) == 1 else ""  # empty: not known yet
         self._version = settings.codecs["0.6"].get("Get_Version") if "0.6" in settings.codecs else None
@@ -78,7 +79,7 @@ class Axes:
             DeviceError: the bus is gone.
         """
         came = False
-        for frame in self._wire.receive():
+        for frame in self._wire.receive(now_ns):
             self._take(frame, now_ns)
             came = True
         self.load.update(now_ns)
@@ -151,6 +152,10 @@ class Axes:
         self._sequence += 1 + lost
         turning = [axis.turning for axis in self.each if axis.turning is not None]
         captured_ns = max(each.captured_ns for each in turning)
+        if captured_ns <= self._newest_ns:  # the bus's clock has jumped
+            self._health.dropped += 1
+            return
+        self._newest_ns = captured_ns
         turns = [each.turns + each.turns_s * (captured_ns - each.captured_ns) * 1e-9 for each in turning]
         latency_ns = round(self._settings.latency_s * 1e9)
         turns_s = [each.turns_s for each in turning]

@@ -12,7 +12,7 @@ import can
 from drivers.interface.errors import DeviceError
 
 MOST_A_POLL = 256  # frames, so that a flooded bus cannot hold up a command
-OLDEST_S = 0.05  # no frame waited longer: the bus's stamps are wall-clock times, which may jump
+OLDEST_NS = 200_000_000  # no frame waited longer: the bus's stamps are wall-clock times, which may jump
 
 
 class Frame(NamedTuple):
@@ -31,8 +31,8 @@ class Wire(Protocol):
         """Return the descriptor that becomes readable, or -1."""
         ...
 
-    def receive(self) -> Iterator[Frame]:
-        """Yield what has come, without waiting."""
+    def receive(self, now_ns: int) -> Iterator[Frame]:
+        """Yield what has come until `now_ns` on CLOCK_MONOTONIC (or a little later), without waiting."""
         ...
 
     def send(self, identifier: int, data: bytes, request: bool = False) -> None:
@@ -72,13 +72,13 @@ class CanWire:
         """Return the bus's descriptor, or -1 where it has none."""
         return int(self._bus.fileno())
 
-    def receive(self) -> Iterator[Frame]:
+    def receive(self, now_ns: int) -> Iterator[Frame]:
         """Yield what has come, at most `MOST_A_POLL` frames.
 
         Raises:
             DeviceError: the bus is gone.
         """
-        now_s = time.time()
+        stamp_ns = now_ns + time.time_ns() - time.monotonic_ns()  # what the bus's clock said at `now_ns`
         for _ in range(MOST_A_POLL):
             try:
                 message = self._bus.recv(0.0)
@@ -86,9 +86,9 @@ class CanWire:
                 raise self._lost(error) from error
             if message is None:
                 return
-            age_s = min(max(now_s - message.timestamp, 0.0), OLDEST_S)
+            age_ns = min(max(stamp_ns - int(message.timestamp * 1e9), 0), OLDEST_NS)
             plain = not (message.is_extended_id or message.is_remote_frame or message.is_error_frame or message.is_fd)
-            yield Frame(message.arbitration_id, message.data, plain, int(age_s * 1e9))
+            yield Frame(message.arbitration_id, message.data, plain, age_ns)
 
     def send(self, identifier: int, data: bytes, request: bool = False) -> None:
         """Send a frame.

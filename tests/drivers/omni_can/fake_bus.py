@@ -26,7 +26,7 @@ class FakeBus:
     def fileno(self):
         return -1
 
-    def receive(self):
+    def receive(self, now_ns):
         frames, self.incoming = self.incoming, []
         yield from frames
 
