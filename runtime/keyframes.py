@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from runtime.cycle import Cycle
 from runtime.faults import Fault
 from runtime.parts import Parts
-from runtime.planning import Checkpoint, RunnerState
+from runtime.planning import RunnerState
 from runtime.supervisor import SupervisorState
 from runtime.watch import SECOND_NS
 
@@ -32,13 +32,13 @@ class KeyFrame:
     planner: bytes
     shield: bytes
 
-    def restore(self, parts: Parts) -> None:
-        """Have the parts go on from here."""
-        parts.estimator.restore(self.estimator)
-        parts.router.restore(self.router)
-        parts.shield.restore(self.shield)
+    def restore(self, parts: Parts, anew: frozenset[str] = frozenset()) -> None:
+        """Have the parts go on from here, but for those named in `anew`, which are others than were recorded."""
+        for name in ("estimator", "router", "planner", "shield"):
+            if name not in anew:
+                getattr(parts, name).restore(getattr(self, name))
         parts.supervisor.state = self.state.supervisor
-        parts.runner.restore(Checkpoint(self.state.runner, self.planner))
+        parts.runner.state = self.state.runner
 
 
 @dataclass(frozen=True, slots=True)

@@ -86,10 +86,14 @@ class PlannerRunner:
         """Have a checkpoint taken at the next tick, between two plans: only there does nobody else use the planner."""
         self._asked, self.checkpoint = True, None
 
-    def restore(self, checkpoint: Checkpoint) -> None:
-        """Go on from a checkpoint; the next call of `plan` is that of its tick."""
-        self._planner.restore(checkpoint.planner)
-        self._next_tick, self._plan, self._pending = checkpoint.state.next_tick, checkpoint.state.plan, None
+    @property
+    def state(self) -> RunnerState:
+        """What it goes on from while no plan is in the making; once set, the next call of `plan` is that of its tick."""
+        return RunnerState(self._next_tick, self._plan)
+
+    @state.setter
+    def state(self, state: RunnerState) -> None:
+        self._next_tick, self._plan, self._pending = state.next_tick, state.plan, None
 
     def close(self) -> None:
         """Let go of the background thread without waiting for a planner that hangs."""
@@ -100,7 +104,7 @@ class PlannerRunner:
         """Return what to go on from; None while a plan is in the making."""
         if self._pending is not None:
             return None
-        return Checkpoint(RunnerState(self._next_tick, self._plan), self._planner.snapshot())
+        return Checkpoint(self.state, self._planner.snapshot())
 
     def _collect(self, tick: int) -> None:
         if self._pending is None or tick < self._pending[0]:

@@ -12,6 +12,7 @@ from drivers.interface.errors import ConfigurationError
 from runtime.assembly import assemble_recorded
 from runtime.configuration import Configuration
 from runtime.cycle import Cycle
+from runtime.keyframes import KeyFrame
 from runtime.log import rvl
 from runtime.log.exact import CHECK
 from runtime.log.header import RunHeader, processor
@@ -30,6 +31,9 @@ from runtime.replay.stretches import Stretches
 from runtime.stopwatch import Stopwatch
 
 ELSEWHERE = 1e-6  # tolerance on another processor: its last bits differ, and what they are multiplied by is not large
+
+
+_NAMED = ("estimator", "router", "planner", "shield")
 
 
 class SideBySide(Protocol):
@@ -119,7 +123,7 @@ class _Replay:
         robot, parts = self._assembled()
         frame = first.key_frame
         if frame is not None:
-            self._restored(frame.restore, parts)
+            self._restore(frame, parts)
 
         def again() -> Iterator[Row]:
             yield first
@@ -146,13 +150,16 @@ class _Replay:
         parts.warm_up()
         return robot, parts
 
-    def _restored(self, restore: Callable[[Parts], None], parts: Parts) -> None:
-        """Begin with a key frame; with another planner it is one that begins anew."""
+    def _restore(self, frame: KeyFrame, parts: Parts) -> None:
+        """Begin with a key frame; a part of another name than was recorded begins anew."""
+        recorded = configuration_of(self._header.configuration_yaml, str(self._log), None, ())
+        anew = frozenset(name for name in _NAMED if _name_of(recorded, name) != _name_of(self._configuration, name))
         try:
-            restore(parts)
-        except Exception as error:
-            if not self._counterfactual:
-                raise ConfigurationError(f"a key frame of the log {self._log} does not fit: {error}") from error
+            frame.restore(parts, anew)
+        except (KeyError, ValueError, IndexError, TypeError) as error:
+            raise ConfigurationError(
+                f"a key frame of the log {self._log} does not fit the parts that it is replayed with: {error}"
+            ) from error
 
     def _record(self, cycle: Cycle, row: Row, side_by_side: SideBySide | None) -> None:
         now_ns = cycle.sensed.tick.start_ns
@@ -164,3 +171,8 @@ class _Replay:
             self._first = self._first or difference
         if side_by_side is not None:
             side_by_side.put(row, cycle)
+
+
+def _name_of(configuration: Configuration, part: str) -> str:
+    chosen = configuration.planner.choice if part == "planner" else getattr(configuration, part)
+    return str(chosen.name)
