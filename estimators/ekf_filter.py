@@ -70,11 +70,24 @@ class MotionFilter:
         if not abs(rate) <= self._limits.turn_rate_max_rad_s or not s.accel_min_m_s2 <= force <= s.accel_max_m_s2:
             return state._replace(dropped=state.dropped + 1)
         recent = self._gyro_is_recent(state, captured_ns)
+        fx, fy = self._at_base(state, fx, fy, rate, captured_ns) if recent else (fx, fy)
         mean_rate = 0.5 * (state.rate_rad_s + rate) if recent else rate
         old = state.force_m_s2 if recent and state.force_m_s2 is not None else (fx, fy)
         mean_force = 0.5 * (old[0] + fx), 0.5 * (old[1] + fy)
         moved = self._to(state, captured_ns, mean_rate, mean_force, known=recent)
         return moved._replace(rate_rad_s=rate, force_m_s2=(fx, fy), gyro_ns=captured_ns)
+
+    def _at_base(self, state: EkfState, fx: float, fy: float, rate: float, time_ns: int) -> tuple[float, float]:
+        """Return the specific force at the base's origin: where the unit sits, turning pulls outwards and speeding up sideways.
+
+        Source: the acceleration of a point of a rigid body, a + dw/dt x r + w x (w x r) (Siciliano et al., Robotics, appendix).
+        """
+        x_m, y_m = self._limits.imu_x_m, self._limits.imu_y_m
+        if (x_m == 0.0 and y_m == 0.0) or state.gyro_ns is None or time_ns <= state.gyro_ns:
+            return fx, fy
+        spin = (rate - state.rate_rad_s) * SECOND_NS / (time_ns - state.gyro_ns)
+        turning = 0.5 * (rate + state.rate_rad_s) - float(state.x[GYRO_BIAS])
+        return fx + turning * turning * x_m + spin * y_m, fy + turning * turning * y_m - spin * x_m
 
     def _fold_wheels(self, state: EkfState, sample: WheelSample) -> EkfState:
         model, captured_ns = self._wheels, sample.stamp.captured_ns

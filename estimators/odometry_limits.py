@@ -12,3 +12,5 @@ class MotionLimits:
     gyro_bias_rad_s: float = 0.0
     gyro_scale: float = 1.0  # true rate = scale times what the gyro says, less the bias
     wheels_late_s: float = 0.0  # how much later than the gyro's the wheels' stamps are
+    imu_x_m: float = 0.0  # where the accelerometer sits in base
+    imu_y_m: float = 0.0

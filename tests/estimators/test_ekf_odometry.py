@@ -245,6 +245,54 @@ def test_wheels_that_contradict_the_inertial_unit_for_long_are_divergence_and_th
     assert all(np.isfinite(estimate.covariance).all() for estimate in estimates)
 
 
+def offset(drive, x_m, y_m):
+    """The same drive with the inertial unit away from the base's origin: what a point there of a rigid body feels."""
+    rates = [0.0, *(s.gyro_rad_s[2] for s in drive.imu)]
+    moved = []
+    for before, sample in zip(rates, drive.imu, strict=False):
+        rate = sample.gyro_rad_s[2]
+        spin, turning = (rate - before) / STEP_S, 0.5 * (rate + before)
+        fx, fy, fz = sample.accel_m_s2
+        moved.append(replace(sample, accel_m_s2=(fx - turning**2 * x_m - spin * y_m, fy - turning**2 * y_m + spin * x_m, fz)))
+    return moved
+
+
+def test_the_place_of_the_inertial_unit_is_taken_into_account():
+    turns = [BodyTwist(0.0, 0.0, 2.0 * math.sin(0.02 * i)) for i in range(800)]
+    drive = Drive(OMNI, STILL + turns)
+    away = offset(drive, 0.3, -0.2)
+
+    def worst(**how):
+        # Few wheel samples, or they would outweigh what the accelerometer says.
+        estimates = feed(ekf(**how), away, drive.wheels[::20], drive.end_ns)
+        return max(math.hypot(e.twist.vx, e.twist.vy) for e in estimates)
+
+    assert worst(imu_x_m=0.3, imu_y_m=-0.2) < 0.2 * worst()
+
+
+def test_ten_minutes_of_standing_and_driving_does_not_diverge_and_a_broken_gyro_does():
+    """Sparse samples spare time.  What grows without bound, the variance of the position, is no divergence."""
+    odometry, angles, pose = ekf(), np.zeros(3), SE2()
+    odometry.warm_up()
+    tick_ns = 200 * MS
+    for tick in range(1, 5 * 600):
+        twist = BodyTwist(0.2, 0.0, 0.3) if (tick // 100) % 2 else BodyTwist()
+        pose, angles = pose.integrate(twist.vx, 0.0, twist.wz, 0.2), angles + 0.2 * OMNI.wheel_rates(twist)
+        force = (0.0, twist.wz * twist.vx, 9.81)
+        times = range((tick - 1) * tick_ns + 40 * MS, tick * tick_ns + 1, 40 * MS)
+        imu = [ImuSample(Stamp(at, at, 0), (0.0, 0.0, twist.wz + 0.004), force) for at in times]
+        base = [wheels(tick * tick_ns, angles, OMNI.wheel_rates(twist))]
+        estimate = odometry.update(sensed(tick * tick_ns, imu=imu, base=base))
+        assert EstimatorFault.DIVERGED not in estimate.faults
+    assert abs(math.remainder(estimate.odom_from_base.yaw - pose.yaw, math.tau)) < 0.1
+    assert estimate.covariance[0, 0] > 1e-4
+    broken = []
+    for at in range(tick * tick_ns + 40 * MS, (tick + 50) * tick_ns, 40 * MS):
+        imu = [ImuSample(Stamp(at, at, 0), (0.0, 0.0, 3.0), (0.0, 0.0, 9.81))]
+        broken += odometry.update(sensed(at, imu=imu, base=[wheels(at, angles, 0.0 * angles)])).faults
+    assert EstimatorFault.DIVERGED in broken
+
+
 def test_silence_is_survived_and_costs_certainty():
     drive = square()
     odometry = ekf()
