@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import socket
 import threading
+import time
+from dataclasses import replace
 from typing import ClassVar
 
 from pydantic import Field
@@ -13,7 +15,7 @@ from drivers.interface.devices import DeviceHealth, DeviceSetup, DeviceState
 from drivers.interface.errors import DeviceError
 from drivers.interface.samples import TruthSample, merged_truth
 from drivers.interface.settings import Settings
-from drivers.interface.truth_wire import BYE, LARGEST_DATAGRAM, REFUSED, REPEAT_S, RUN, TruthLook, decode
+from drivers.interface.truth_wire import BYE, LARGEST_DATAGRAM, REFUSED, REPEAT_S, RUN, decode
 
 LOOPBACK = "127.0.0.1"
 POLL_S = 0.05
@@ -57,6 +59,7 @@ class EmulatedTruth:
         """
         self.close()
         self._reset()
+        self._offset_ns = self._setup.now_ns() - time.monotonic_ns()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.connect((LOOPBACK, self._settings.port))
         self._socket.settimeout(POLL_S)
@@ -113,15 +116,15 @@ class EmulatedTruth:
         self._newest = None
         self._received = self._dropped = 0
         self._late_ns = self._late_at_first_ns = 0
+        self._offset_ns = 0  # of the loop's clock against CLOCK_MONOTONIC, which the emulation stamps with
 
     def _listen(self, link: socket.socket) -> None:
         """Read until told to leave; runs in the thread."""
-        due_ns = 0
+        due_s = 0.0
         while not self._leave.is_set():
-            now_ns = self._setup.now_ns()
-            if now_ns >= due_ns:
+            if time.monotonic() >= due_s:
                 _send(link, RUN)
-                due_ns = now_ns + round(REPEAT_S * 1e9)
+                due_s = time.monotonic() + REPEAT_S
             try:
                 datagram = link.recv(LARGEST_DATAGRAM)
             except TimeoutError:
@@ -138,14 +141,15 @@ class EmulatedTruth:
             self._answered.set()
             return
         try:
-            look: TruthLook = decode(datagram, self._setup.now_ns())
+            look = decode(datagram, time.monotonic_ns() + self._offset_ns)
         except ValueError:
             self._dropped += 1
             return
         if self._received == 0:
             self._late_at_first_ns = look.late_ns
         self._late_ns = look.late_ns
-        self._ring.put(look.sample)
+        stamp = replace(look.sample.stamp, captured_ns=look.sample.stamp.captured_ns + self._offset_ns)
+        self._ring.put(replace(look.sample, stamp=stamp))
         self._received += 1
         self._answered.set()
 
