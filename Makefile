@@ -21,6 +21,8 @@ demo: $(STAMP)  ## drive the omni robot through the dynamic hallway and record i
 picture: $(STAMP)  ## make the README's picture (needs a Vulkan driver; a software one will do)
 	$(BIN)/trundle run dynamic_hallway --seed 1 --log runs/picture.rrd --force
 	$(BIN)/trundle review runs/picture.rrd --at 212 --screenshot docs/dynamic_hallway.png
+	$(BIN)/trundle run dynamic_hallway --seed 1 --realtime --set loop.rate_hz=40 --log runs/late.rrd --force
+	$(BIN)/trundle review runs/late.rrd --at 300 --question late --screenshot docs/why_late.png
 
 test: lint  ## what CI runs: format, lint, types, layers, tests
 	$(BIN)/python -m pytest -n 2

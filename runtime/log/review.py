@@ -14,7 +14,8 @@ from rerun.experimental import ViewerClient
 
 from drivers.interface.errors import ConfigurationError
 from runtime.log.layout import Question
-from runtime.log.opening import require_log
+from runtime.log.opening import require_recording
+from runtime.log.paths import files_of
 from runtime.log.read import ticks
 from runtime.log.repair import quiet_environment, rerun_program
 
@@ -37,7 +38,7 @@ def review(
     Raises:
         ConfigurationError: the log, the tick or this machine's graphics will not do; says why.
     """
-    require_log(log)
+    require_recording(log)  # a comparison has no schema of ticks
     if at_tick is not None:
         _require_tick(log, at_tick)
     if screenshot is None and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
@@ -98,7 +99,8 @@ class _Viewer:
         self._said = tempfile.TemporaryFile()  # noqa: SIM115 - closed in __exit__
         port = _free_port()
         self.url = f"rerun+http://127.0.0.1:{port}/proxy"
-        command = [rerun_program(), "--bind", "127.0.0.1", "--port", str(port), "--window-size", window, str(log)]
+        command = [rerun_program(), "--bind", "127.0.0.1", "--port", str(port), "--window-size", window]
+        command += [str(file) for file in files_of(log)]  # segments are one recording to the viewer
         command += ["--headless"] if headless else []
         self.process = subprocess.Popen(command, env=quiet_environment(), stdout=subprocess.DEVNULL, stderr=self._said)
 

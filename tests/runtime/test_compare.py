@@ -10,7 +10,7 @@ from drivers.interface.seeds import stream
 from runtime.cli import run_command
 from runtime.compare import block_medians, compare, compared, difference, summary
 from runtime.cycle import Cycle
-from runtime.log.read import read
+from runtime.log.opening import reader_of
 from runtime.quantities import Quantity, quantities
 from tests.runtime.log_cycles import make_cycles
 from tests.runtime.test_log_recorder import record
@@ -105,7 +105,7 @@ def test_the_command_writes_table_figures_and_recording(
     figures = {quantity["name"]: quantity for quantity in json.loads(paths["json"].read_text())["quantities"]}
     assert figures["sense time"]["difference"]["median"] == pytest.approx(2.0)
     assert "| sense time [ms] | A | 0.4 |" in paths["md"].read_text()
-    drawn = read(paths["rrd"]).entities
+    drawn = {chunk.entity_path for chunk in reader_of(paths["rrd"]).stream()}
     plots = [entity for entity in drawn if entity.startswith("/compare/") and entity[-2:] in {"/A", "/B"}]
     assert len(plots) == 2 * len(figures)
     assert run_command(["compare", a, b, "--log", str(paths["rrd"])]) == 2
