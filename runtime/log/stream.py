@@ -40,21 +40,36 @@ class _Part:
     offsets: list[int]
 
 
+class _Piece:
+    """The columns of one chunk; each is taken out of it when it is first asked for, as many never are."""
+
+    def __init__(self, columns: Mapping[str, pa.Array], parts: dict[str, _Part]) -> None:
+        self._columns, self._parts = columns, parts
+
+    def __iter__(self) -> Iterator[tuple[str, _Part]]:
+        for name, column in self._columns.items():
+            if name not in self._parts:
+                self._parts[name] = _part(column)
+        return iter(self._parts.items())
+
+
 class Row:
     """What a log holds of one tick."""
 
     def __init__(self, tick: int) -> None:
         """Start with nothing."""
         self.tick = tick
-        self._cells: dict[str, dict[str, tuple[_Part, int]]] = {}
+        self._pieces: dict[str, list[tuple[_Piece, int]]] = {}
 
-    def add(self, entity: str, column: str, part: _Part, row: int) -> None:
-        """Add a cell."""
-        self._cells.setdefault(entity, {})[column] = part, row
+    def add(self, entity: str, piece: _Piece, row: int) -> None:
+        """Add a row of a piece."""
+        self._pieces.setdefault(entity, []).append((piece, row))
 
     def cells(self, entity: str) -> dict[str, Sequence[Any]]:
         """Return the values of an entity by the names of their columns; those without any are left out."""
-        return {name: values for name, (part, row) in self._cells.get(entity, {}).items() if (values := _slice(part, row))}
+        return {
+            name: values for piece, row in self._pieces.get(entity, ()) for name, part in piece if (values := _slice(part, row))
+        }
 
     @property
     def sensed(self) -> Sensed:
@@ -71,7 +86,7 @@ class Row:
     @property
     def has_key_frame(self) -> bool:
         """Whether what the tick was begun with was recorded."""
-        return KEY_FRAME in self._cells
+        return KEY_FRAME in self._pieces
 
     @property
     def skipped(self) -> int:
@@ -118,10 +133,12 @@ class Row:
         """Whether the checksum fits what the log holds."""
         found: list[Cells] = []
         for schema in _consumed().values():
-            for name, (part, row) in self._cells.get(schema.entity, {}).items():
-                start, end = part.offsets[row], part.offsets[row + 1]
-                values = _slice(part, row) if part.array is None else part.array[start:end]
-                found.append(Cells(f"{schema.entity} {name}", values, [end - start]))
+            for piece, row in self._pieces.get(schema.entity, ()):
+                for name, part in piece:
+                    start, end = part.offsets[row], part.offsets[row + 1]
+                    if end > start:
+                        values = _slice(part, row) if part.array is None else part.array[start:end]
+                        found.append(Cells(f"{schema.entity} {name}", values, [end - start]))
         return bool(checksums(found, 1)[0] == self.cells(CHECK)["crc32"][0])
 
 
@@ -153,17 +170,22 @@ class _Gathering:
 
     def add(self, entity: str, batch: pa.RecordBatch) -> None:
         """Add a chunk."""
-        known = _columns().get(entity)
-        ticks: list[int] = next((c.to_pylist() for f, c in zip(batch.schema, batch.columns, strict=True) if f.name == "tick"), [])
+        known, times, found = _columns().get(entity), None, {}
         for field, column in zip(batch.schema, batch.columns, strict=True):
-            if (field.metadata or {}).get(b"rerun:kind") != b"data" or not _is_ours(entity, field.name, known):
-                continue
-            part = self._part(column, is_image=field.name == _IMAGE)
-            name = _IMAGE_COLUMN if field.name == _IMAGE else field.name
-            for row, tick in enumerate(ticks):
-                self._row(tick).add(entity, name, part, row)
-            if entity in self._reached and field.name != _IMAGE and ticks:
-                self._reached[entity] = max(self._reached[entity], *ticks)
+            kind = (field.metadata or {}).get(b"rerun:kind")
+            if kind == b"index" and field.name == "tick":
+                times = column
+            elif kind == b"data" and _is_ours(entity, field.name, known):
+                found[field.name] = column
+        if times is None or not found:
+            return
+        image = found.pop(_IMAGE, None)
+        piece = _Piece(found, {} if image is None else {_IMAGE_COLUMN: self._images(image)})
+        ticks: list[int] = times.to_pylist()
+        for row, tick in enumerate(ticks):
+            self._row(tick).add(entity, piece, row)
+        if entity in self._reached and found:
+            self._reached[entity] = max(self._reached[entity], *ticks)
 
     def complete(self) -> Iterator[Row]:
         """Yield the ticks of which every entity has come, in order."""
@@ -181,18 +203,26 @@ class _Gathering:
             self._open[tick] = Row(tick)
         return self._open[tick]
 
-    def _part(self, column: pa.Array, *, is_image: bool) -> _Part:
-        offsets = column.offsets.to_numpy()
-        offsets = (offsets - offsets[0]).tolist()
-        flat = column.flatten()  # unlike `values` it respects a slice of the column
-        if is_image:
-            return _Part([self._decoding.submit(rvl.decode, item.values.to_numpy()) for item in flat], None, offsets)
-        if pa.types.is_list(flat.type):
-            return _Part([item.values.to_numpy() for item in flat], None, offsets)
-        if pa.types.is_primitive(flat.type) and flat.null_count == 0:
-            array = flat.to_numpy(zero_copy_only=False)
-            return _Part(array.tolist(), np.asarray(array), offsets)
-        return _Part(flat.to_pylist(), None, offsets)
+    def _images(self, column: pa.Array) -> _Part:
+        """Return the images, in the making."""
+        codes = column.flatten()
+        return _Part([self._decoding.submit(rvl.decode, code.values.to_numpy()) for code in codes], None, _offsets(column))
+
+
+def _part(column: pa.Array) -> _Part:
+    offsets, flat = _offsets(column), column.flatten()  # unlike `values` it respects a slice of the column
+    if pa.types.is_list(flat.type):
+        return _Part([item.values.to_numpy() for item in flat], None, offsets)
+    if pa.types.is_primitive(flat.type) and flat.null_count == 0:
+        array = flat.to_numpy(zero_copy_only=False)
+        return _Part(array.tolist(), np.asarray(array), offsets)
+    return _Part(flat.to_pylist(), None, offsets)
+
+
+def _offsets(column: pa.Array) -> list[int]:
+    offsets = column.offsets.to_numpy()
+    shifted: list[int] = (offsets - offsets[0]).tolist()
+    return shifted
 
 
 def _slice(part: _Part, row: int) -> Sequence[Any]:
