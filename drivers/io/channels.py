@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from drivers.interface.frame_slot import FrameSlot
+from drivers.interface.shared_memory import Block
+from drivers.interface.shared_ring import SharedRing
 from drivers.io.command_slot import CommandSlot
-from drivers.io.frame_slot import FrameSlot
 from drivers.io.health import HealthBlock
-from drivers.io.memory import Block
-from drivers.io.ring import SharedRing
 
 
 @dataclass(frozen=True, slots=True)

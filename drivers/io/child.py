@@ -87,7 +87,8 @@ class Shell:
     def _open(self) -> None:
         self._channels.health.beat(0)  # this may take its time
         self._session.open()
-        self._health.fault = self._health.fault if self._health.state is DeviceState.FAULTED else ""
+        if self._health.state is DeviceState.OPEN:  # until then the fault says why it was lost
+            self._health.fault = ""
         self._backoff.succeeded()
 
     def _serve(self) -> None:
@@ -122,6 +123,7 @@ class Shell:
         self._health.fault = str(error) or type(error).__name__
         self._health.reconnects += 1
         self._port.reopened = True
+        self._publish(time.monotonic_ns())
         until_ns = time.monotonic_ns() + round((pause_s or 0.0) * 1e9)
         asked = self._resets
         while self._wait((until_ns - time.monotonic_ns()) * 1e-9 if pause_s is not None else HEARTBEAT_S):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.io.memory import Block, Seqlock
+from drivers.interface.shared_memory import Block, Seqlock
 
 F64 = NDArray[np.float64]
 

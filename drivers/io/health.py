@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from drivers.interface.devices import DeviceState
-from drivers.io.memory import Block, Seqlock
+from drivers.interface.shared_memory import Block, Seqlock
 
 FIGURES = 32
 STATES = tuple(DeviceState)

@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from drivers.interface.devices import DeviceState
 from drivers.interface.errors import DeviceError
+from drivers.interface.frame_slot import FrameSlot
+from drivers.interface.shared_memory import allocate
+from drivers.interface.shared_ring import SharedRing
 from drivers.io.backoff import Backoff, BackoffSettings
 from drivers.io.channels import Channels, MemorySpec
 from drivers.io.child import Task
 from drivers.io.child_handle import ChildHandle
-from drivers.io.frame_slot import FrameSlot
 from drivers.io.health import HealthRecord
-from drivers.io.memory import allocate
-from drivers.io.ring import SharedRing
 
 WATCH_S = 0.05
 SETTLED_S = 5.0  # a child that lived so long starts a new series of failures

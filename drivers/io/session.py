@@ -9,10 +9,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.interface.frame_slot import FrameSlot
+from drivers.interface.shared_ring import SharedRing
 from drivers.io.channels import Channels, MemorySpec
-from drivers.io.frame_slot import FrameSlot
 from drivers.io.health import HealthRecord
-from drivers.io.ring import SharedRing
 
 
 @dataclass(slots=True)

@@ -66,7 +66,7 @@ class OmniCanSession:
         self._wire = self._join(self._settings.bus)
         self._axes = Axes(self._settings, self._port, self._wire)
         self._phase, self._began_ns, self._brakes, self._gathering = Phase.CONNECTING, None, False, False
-        self._health.state, self._health.fault = DeviceState.RECONNECTING, ""
+        self._health.state = DeviceState.RECONNECTING
 
     def wakes_on(self) -> tuple[int, ...]:
         """Return the bus's descriptor, except right after frames came: others that follow closely are read together."""

@@ -13,9 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.interface.devices import DeviceState
+from drivers.interface.shared_memory import allocate
 from drivers.io.channels import Channels, FrameSpec, MemorySpec, RingSpec
 from drivers.io.health import HealthRecord
-from drivers.io.memory import allocate
 
 PAIR = np.dtype([("a", "i8"), ("b", "f8")])
 WIDE = np.dtype([("n", "i8", (40,))])
