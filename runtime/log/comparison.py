@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from drivers.interface.errors import ConfigurationError
 from runtime.log import colours
+from runtime.log.header import SCHEMA_VERSION
 from runtime.log.recording import new_recording
 
 Pair = tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]  # of A and B; None: not in that log
@@ -37,6 +38,7 @@ def write_comparison(path: Path, pairs: Mapping[str, Pair], text: str) -> None:
                     stream.log(entity, rr.SeriesLines(names=which, colors=[colour], widths=[2.0]), static=True)
                     quantiles = np.percentile(values, _STEPS / 10)
                     stream.send_columns(entity, [rr.TimeColumn(TIMELINE, sequence=_STEPS)], rr.Scalars.columns(scalars=quantiles))
+        stream.log("/run", rr.AnyValues(schema_version=SCHEMA_VERSION), static=True)
         stream.log("/compare/table", rr.TextDocument(text, media_type="text/markdown"), static=True)
         stream.flush(timeout_sec=10.0)
         stream.disconnect()

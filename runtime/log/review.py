@@ -14,7 +14,7 @@ from rerun.experimental import ViewerClient
 
 from drivers.interface.errors import ConfigurationError
 from runtime.log.layout import Question
-from runtime.log.opening import require_recording
+from runtime.log.opening import require_log
 from runtime.log.paths import files_of
 from runtime.log.read import ticks
 from runtime.log.repair import quiet_environment, rerun_program
@@ -38,7 +38,8 @@ def review(
     Raises:
         ConfigurationError: the log, the tick or this machine's graphics will not do; says why.
     """
-    require_recording(log)  # a comparison has no schema of ticks
+    for file in files_of(log):
+        require_log(file)
     if at_tick is not None:
         _require_tick(log, at_tick)
     if screenshot is None and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
