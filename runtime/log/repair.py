@@ -45,6 +45,8 @@ def repair(damaged: Path, repaired: Path | None = None) -> Path:
     if path.suffix != ".rrd":
         raise ConfigurationError(f"--output takes a file that ends in .rrd, as the viewer does; not {path}")
     files = files_of(damaged)
+    if len(files) > 1:  # a writer that was killed has just begun the last of them
+        files = tuple(file for file in files if not file.is_file() or file.stat().st_size)
     for file in files:
         require_recording(file)
     with TemporaryDirectory(dir=_folder(path), prefix=".repair-") as folder:

@@ -20,7 +20,7 @@ from runtime.log.verification import Verification, verify
 from tests.runtime.log_cycles import header, make_cycles
 
 PERIOD_NS = 20_000_000
-SETTINGS = LogSettings(segment_mb=0.3)  # so small that some are killed while one file ends and the next begins
+SETTINGS = LogSettings(segment_mb=1.0)  # so small that some are killed while one file ends and the next begins
 
 
 def record_until_killed(path: Path) -> None:
