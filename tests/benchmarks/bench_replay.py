@@ -60,7 +60,7 @@ def _key_frame_ms() -> float:
     frames: list[KeyFrames] = []
     taken: list[float] = []
     options = run.RunOptions(
-        ready=lambda assembly: frames.append(KeyFrames(assembly.parts, 1e-9)),
+        ready=lambda assembly: frames.append(KeyFrames(assembly.parts, 0.0)),
         progress=lambda cycle: taken.append(_timed(frames[0], cycle)),
     )
     run.run(configuration.load("dynamic_hallway", ("mission.time_limit_s=2",)), options)
