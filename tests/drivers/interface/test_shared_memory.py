@@ -118,7 +118,7 @@ def test_health_arrives_as_it_was_told(both):
 WRITER = """
 import sys; sys.path[:] = sys.argv[2:]
 import numpy as np
-from tests.drivers.io.test_shared_memory import SPEC
+from tests.drivers.interface.test_shared_memory import SPEC
 from drivers.io.channels import Channels
 channels = Channels.shared(SPEC, int(sys.argv[1]), Channels(SPEC, None).size)
 n = 0
