@@ -67,7 +67,8 @@ class Supervisor:
         reachable = self._reachable(worst(faults))
         asked = self._asked(plan, belief, sensed, reachable)
         filtered = self._shielded(asked, belief, reachable, faults)
-        command = self._checked(self._responding(worst(faults), asked, filtered, sensed), sensed, faults)
+        command = self._slowed(self._responding(worst(faults), asked, filtered, sensed), worst(faults))
+        command = self._checked(command, sensed, faults)
         self._remember(command)
         return Verdict(command, asked, worst(faults), tuple(faults), reachable, filtered, self._board.given)
 
@@ -120,6 +121,12 @@ class Supervisor:
         if response is Response.RUN or response is Response.DECELERATE:
             return asked if filtered is None else filtered.command
         return self._stopping(asked)
+
+    def _slowed(self, command: Command, response: Response) -> Command:
+        """Lower the arm's speed limits while decelerating; the base's are in what it can reach."""
+        if response is not Response.DECELERATE or command.arm is None:
+            return command
+        return replace(command, arm=replace(command.arm, speed_factor=self._settings.slow_factor * command.arm.speed_factor))
 
     def _checked(self, command: Command, sensed: Sensed, faults: list[FaultReport]) -> Command:
         """Assert, last before the wire: finite, inside the limits, not expired.  It repairs nothing; it stops."""

@@ -2,42 +2,27 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, ClassVar
 
-import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
-from drivers.interface.arm_motion import JOINTS, PANDA, TrajectoryFollower
+from drivers.interface.arm_motion import PANDA, TrajectoryFollower
 from drivers.interface.commands import JointLimits, JointTrajectory
 from drivers.interface.devices import DeviceHealth, DeviceSetup, DeviceState
 from drivers.interface.errors import DeviceError
 from drivers.interface.samples import JointSample, Stamp, frozen_array
 from drivers.interface.seeds import stream
 from drivers.interface.settings import Settings
-from sim_drivers.arm_model import LEAD_S, MODEL, attach_panda, panda_joint
+from sim_drivers.arm_model import MODEL, ArmBuild, PandaJoints
 from sim_drivers.delivery import Delivery
 from sim_drivers.world import SECOND_NS, MujocoWorld, require_world
 
-Joints = tuple[float, float, float, float, float, float, float]
 
-READY_RAD: Joints = (0.0, -math.pi / 4, 0.0, -3 * math.pi / 4, 0.0, math.pi / 2, math.pi / 4)  # Franka's "ready" pose
+class ArmSettings(ArmBuild):
+    """How the arm is built, and its wire.  Franka streams at 1 kHz; the loop is given every tenth sample."""
 
-
-class ArmSettings(Settings):
-    """Mount, start and measurement of the arm.  Franka streams at 1 kHz; the loop is given every tenth sample."""
-
-    mount_x_m: float = Field(default=0.0, ge=-2.0, le=2.0, description="of link0 in base")
-    mount_y_m: float = Field(default=0.0, ge=-2.0, le=2.0, description="of link0 in base")
-    mount_z_m: float = Field(default=0.0, ge=0.0, le=3.0, description="of link0 in base")
-    mount_yaw_rad: float = Field(default=0.0, ge=-math.pi, le=math.pi, description="of link0 in base")
-    start_rad: Joints = Field(default=READY_RAD, description="joint positions at the start of the world")
     rate_hz: float = Field(default=100.0, gt=0.0, le=1000.0, description="joint samples per second")
-    position_resolution_rad: float = Field(default=1e-5, gt=0.0, le=0.01, description="step of the joint encoders")
-    velocity_noise_rad_s: float = Field(default=0.002, ge=0.0, le=1.0, description="standard deviation")
-    torque_noise_nm: float = Field(default=0.05, ge=0.0, le=10.0, description="standard deviation of the torque sensors")
     latency_s: float = Field(default=0.001, ge=0.0, le=1.0, description="from measuring to our side")
     command_latency_s: float = Field(default=0.001, ge=0.0, le=1.0, description="from command() to the first set point")
     loss_probability: float = Field(default=0.0005, ge=0.0, le=1.0, description="chance that a sample is lost on the way")
@@ -66,7 +51,7 @@ class SimArm:
         self._command_latency_ns = round(settings.command_latency_s * SECOND_NS)
         self._pending: list[tuple[int, JointTrajectory, int]] = []  # applies_ns, trajectory, expires_ns
         self._sample_period_ns = round(SECOND_NS / settings.rate_hz)
-        self._qpos = self._dof = self._ctrl = slice(0, 0)
+        self._joints = PandaJoints(settings, setup.name)
         self._world = require_world(setup)
         self._reset()
         self._world.add(self)
@@ -122,19 +107,11 @@ class SimArm:
 
     def build(self, spec: Any, base: Any) -> None:
         """Attach the model in `configs/models/panda.urdf` to the base, with a servo for each joint."""
-        s = self._settings
-        attach_panda(spec, base, self._setup.name, (s.mount_x_m, s.mount_y_m, s.mount_z_m), s.mount_yaw_rad)
+        self._joints.attach(spec, base)
 
     def bind(self, world: MujocoWorld) -> None:
         """Look up the joints and put them where they start."""
-        model, data = world.model, world.data
-        joint_name = panda_joint(self._setup.name, 0)
-        joint = model.joint(joint_name)
-        first, dof = int(joint.qposadr[0]), int(joint.dofadr[0])
-        servo = int(model.actuator(joint_name).id)
-        self._qpos, self._dof, self._ctrl = (slice(start, start + JOINTS) for start in (first, dof, servo))
-        data.qpos[self._qpos] = self._settings.start_rad
-        mujoco.mj_step1(model, data)
+        self._joints.bind(world)
 
     def act(self, world: MujocoWorld) -> None:
         """Move the set point on, and measure when it is time."""
@@ -142,20 +119,16 @@ class SimArm:
             _, trajectory, expires_ns = self._pending.pop(0)
             self._follower.follow(trajectory, expires_ns)
         self._follower.step(world.now_ns)
-        world.data.ctrl[self._ctrl] = self._follower.position_rad + LEAD_S * self._follower.velocity_rad_s
+        self._joints.drive(world, self._follower.position_rad, self._follower.velocity_rad_s)
         if self._state is DeviceState.OPEN and world.now_ns >= self._next_ns:
             self._measure(world)
 
     def _measure(self, world: MujocoWorld) -> None:
-        s, data, now_ns = self._settings, world.data, world.now_ns
+        now_ns = world.now_ns
         self._next_ns = self._after(now_ns)
-        step = s.position_resolution_rad
-        position: NDArray[np.float64] = np.round(data.qpos[self._qpos] / step) * step
-        velocity = data.qvel[self._dof] + self._rng.normal(0.0, s.velocity_noise_rad_s, JOINTS)
-        load = data.qfrc_actuator[self._dof] + data.qfrc_gravcomp[self._dof]
-        torque = load + self._rng.normal(0.0, s.torque_noise_nm, JOINTS)
+        position, velocity, torque = self._joints.measure(world, self._rng)
         self._sequence += 1
-        if self._rng.random() < s.loss_probability:
+        if self._rng.random() < self._settings.loss_probability:
             self._dropped += 1
             return
         stamp = Stamp(now_ns, now_ns + self._delivery.latency_ns, self._sequence)

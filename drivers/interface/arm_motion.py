@@ -13,6 +13,7 @@ F64 = NDArray[np.float64]
 JOINTS = 7
 POSITION_GAIN_1_S = 25.0
 VELOCITY_GAIN_1_S = 100.0
+STANDING_RAD_S, STANDING_RAD_S2 = 1e-4, 1e-2
 BRAKE_SHARE = 0.8  # of the acceleration that closing a gap counts on; the rest is for the gains
 
 
@@ -45,6 +46,7 @@ class TrajectoryFollower:
         self.velocity_rad_s = np.zeros_like(position_rad)  # (7,)
         self._acceleration = np.zeros_like(position_rad)  # (7,)
         self._spline: CubicHermiteSpline | None = None
+        self._speed_factor = 1.0
         self._start_ns = self._expires_ns = self._last_ns = 0
         self.expired = 0  # times the dead man had to act
 
@@ -55,6 +57,27 @@ class TrajectoryFollower:
             return
         self._spline = CubicHermiteSpline(trajectory.time_from_start_s, trajectory.position_rad, trajectory.velocity_rad_s)
         self._start_ns, self._expires_ns = trajectory.start_ns, expires_ns
+        self._speed_factor = trajectory.speed_factor
+
+    @property
+    def acceleration_rad_s2(self) -> F64:
+        """Acceleration of the set point, shape (7,)."""
+        return self._acceleration
+
+    @property
+    def is_following(self) -> bool:
+        """Whether there is a trajectory to follow."""
+        return self._spline is not None
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether the set point stands."""
+        return bool((np.abs(self.velocity_rad_s) < STANDING_RAD_S).all() and (np.abs(self._acceleration) < STANDING_RAD_S2).all())
+
+    def resume(self, position_rad: F64, velocity_rad_s: F64, acceleration_rad_s2: F64, now_ns: int) -> None:
+        """Go on from where the set point really is at `now_ns`; each of the arrays has the shape (7,)."""
+        self.position_rad, self.velocity_rad_s, self._acceleration = position_rad, velocity_rad_s, acceleration_rad_s2
+        self._last_ns = now_ns
 
     def stop(self) -> None:
         """Forget the trajectory and decelerate to rest."""
@@ -95,4 +118,4 @@ class TrajectoryFollower:
     def _safe_speed(self, distance_rad: F64) -> F64:
         """Return the speed within the limits from which each joint still stops in its distance, both (7,)."""
         braking = np.sqrt(2.0 * BRAKE_SHARE * self._limits.acceleration_rad_s2 * np.maximum(distance_rad, 0.0))
-        return np.asarray(np.minimum(self._limits.velocity_rad_s, braking), dtype=np.float64)
+        return np.asarray(np.minimum(self._speed_factor * self._limits.velocity_rad_s, braking), dtype=np.float64)

@@ -55,6 +55,7 @@ class JointTrajectory:
     time_from_start_s: NDArray[np.float64]  # (knots,)
     position_rad: NDArray[np.float64]  # (knots, joints)
     velocity_rad_s: NDArray[np.float64]  # (knots, joints)
+    speed_factor: float = 1.0  # share of the velocity limits that the arm may use; it follows late where that is too little
 
     @classmethod
     def rest(cls) -> JointTrajectory:
@@ -69,7 +70,7 @@ class JointTrajectory:
     @property
     def finite(self) -> bool:
         """Whether every time, position and velocity is a finite number."""
-        parts = (self.time_from_start_s, self.position_rad, self.velocity_rad_s)
+        parts = (self.time_from_start_s, self.position_rad, self.velocity_rad_s, self.speed_factor)
         return all(bool(np.isfinite(part).all()) for part in parts)
 
 
@@ -104,6 +105,8 @@ class JointLimits:
             return "leaves the joints' range"
         if (np.abs(velocity) > self.velocity_rad_s).any():
             return "is faster than the joints' velocity limits"
+        if not 0.0 < trajectory.speed_factor <= 1.0:
+            return f"has a speed factor of {trajectory.speed_factor:g}, which is not above 0 and at most 1"
         return ""
 
 

@@ -19,8 +19,7 @@ from runtime.cycle import Cycle
 from runtime.faults import Fault, Response
 from runtime.log import read
 from runtime.report import RunReport
-from sim_drivers.arm import READY_RAD
-from sim_drivers.arm_model import panda_joint
+from sim_drivers.arm_model import READY_RAD, panda_joint
 
 MS = 1_000_000
 GOAL = np.array(READY_RAD) + np.array([0.5, 0.4, -0.5, 0.3, 0.6, -0.5, 0.8])

@@ -1,5 +1,6 @@
 import math
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from importlib import resources
 
 import numpy as np
@@ -10,7 +11,8 @@ from drivers.interface.commands import BodyTwist, JointTrajectory
 from drivers.interface.devices import Arm, DeviceSetup
 from drivers.interface.errors import DeviceError
 from drivers.interface.geometry import SE2
-from sim_drivers.arm import READY_RAD, ArmSettings, SimArm
+from sim_drivers.arm import ArmSettings, SimArm
+from sim_drivers.arm_model import READY_RAD
 from sim_drivers.omni_base import OmniBaseSettings, SimOmniBase
 from sim_drivers.scene import Scene
 from sim_drivers.world import MujocoWorld, WorldSettings
@@ -233,3 +235,23 @@ def test_a_trajectory_begins_at_its_own_time_not_when_it_is_sent():
         runs.append(world.data.qpos.copy())
     np.testing.assert_array_equal(*runs)
     assert np.abs(runs[0] - GOAL).max() < 1e-3
+
+
+def test_a_speed_factor_lowers_the_joints_speed_and_it_arrives_late():
+    fast, slow = (peak_and_place(factor) for factor in (1.0, 0.5))
+    assert fast[0] > 0.8 * PANDA.velocity_rad_s[6]
+    assert slow[0] < 0.55 * PANDA.velocity_rad_s[6]
+    assert abs(slow[1] - fast[1]) < 0.01
+
+
+def peak_and_place(factor):
+    """Return the last joint's highest speed on a turn of 2 rad, and where it comes to stand."""
+    world, arm = make()
+    goal = READY + 2.0 * np.eye(7)[6]
+    turn = replace(move(to=goal, seconds=1.4), speed_factor=factor)
+    arm.command(turn, 10**12)
+    peak = 0.0
+    for step in range(1, 400):
+        world.step_to(step * 10 * MS)
+        peak = max(peak, float(abs(world.data.qvel[6])))
+    return peak, float(world.data.qpos[6])
