@@ -64,6 +64,7 @@ class Shell:
         self._backoff = Backoff(task.backoff)
         self._published: tuple[int, DeviceState, str, int] = (0, DeviceState.CLOSED, "", 0)
         self._alive = True
+        self._nowhere = open(os.devnull, "w")  # noqa: SIM115 - for as long as the process lives
 
     def run(self) -> None:
         """Work until the runtime wants no more, or is no more; a lost wire is opened again with back-off."""
@@ -79,10 +80,25 @@ class Shell:
             self._health.state, self._health.fault = DeviceState.FAULTED, f"{type(error).__name__}: {error}"
             raise
         finally:
-            faulthandler.dump_traceback_later(LAST_WORDS_S, exit=True, file=open(os.devnull, "w"))  # noqa: SIM115 - it must stay open
+            self._end_soon()
             self._leave()
             self._publish(time.monotonic_ns())
             faulthandler.cancel_dump_traceback_later()
+
+    def end(self, signal_number: int, frame: object) -> None:
+        """Leave as soon as the call under way returns.
+
+        It raises nothing: the signal that tells of the runtime's death comes at the same time as the lifeline's end, and an
+        exception would cut short the very call that sends zero.
+        """
+        self._alive = False
+        self._end_soon()  # in case that call never returns
+        with suppress(BlockingIOError):
+            os.eventfd_write(self._bell, 1)
+
+    def _end_soon(self) -> None:
+        """Let the process end after its last words, whatever hangs."""
+        faulthandler.dump_traceback_later(LAST_WORDS_S, exit=True, file=self._nowhere)
 
     def _open(self) -> None:
         self._channels.health.beat(0)  # this may take its time
@@ -112,7 +128,8 @@ class Shell:
         readable, _, _ = select.select((self._lifeline, self._bell, *descriptors), (), (), wait_s)
         if self._bell in readable:
             os.eventfd_read(self._bell)
-        self._alive = self._lifeline not in readable
+        if self._lifeline in readable:
+            self._alive = False
         return self._alive
 
     def _lose(self, error: Exception) -> None:
@@ -157,7 +174,7 @@ def main(lifeline_fd: int, memory_fd: int, bell_fd: int) -> None:
     """Be the child: take the task, work, and leave with the runtime."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the runtime's; it tells us
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, _interrupt)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # until there is something to bring to rest
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)  # should the lifeline have leaked into another process
     lifeline = socket.socket(fileno=lifeline_fd)
     task = _receive(lifeline)
@@ -167,17 +184,13 @@ def main(lifeline_fd: int, memory_fd: int, bell_fd: int) -> None:
     os.close(memory_fd)
     code = 0
     try:
-        Shell(task, channels, lifeline, bell_fd).run()
-    except SystemExit:
-        pass
+        shell = Shell(task, channels, lifeline, bell_fd)
+        signal.signal(signal.SIGTERM, shell.end)
+        shell.run()
     except BaseException:  # noqa: BLE001 - the process ends with it; whoever looks for the bug needs to see where it was
         traceback.print_exc()
         code = 1
     os._exit(code)  # at once: no library's threads or destructors may hold up the end
-
-
-def _interrupt(signal_number: int, frame: object) -> None:
-    raise SystemExit
 
 
 def _receive(lifeline: socket.socket) -> Task | None:

@@ -64,7 +64,7 @@ def io(toy):
 
 
 def process(toy, **changes):
-    settings = ToySettings(path=toy.path, hang=changes.pop("hang", ""))
+    settings = ToySettings(path=toy.path, hang=changes.pop("hang", ""), rest_s=changes.pop("rest_s", 0.0))
     return IoProcess(IoSpec("toy", "tests.drivers.io.toy:ToySession", settings, MEMORY, wire=QUICK, restart=QUICK, **changes))
 
 
@@ -202,6 +202,21 @@ def test_what_hangs_in_its_close_is_killed(toy):
     io.close()
     with pytest.raises(ProcessLookupError):
         os.kill(pid, 0)
+
+
+def test_no_signal_keeps_it_from_resting(toy):
+    """The one that tells of the runtime's death may come while the lifeline's end is already being acted upon."""
+    io = process(toy, rest_s=0.3)
+    try:
+        pid = opened(io, toy).pid
+        io.command(np.array([1.0]), later_ns(60.0))
+        assert toy.hear().startswith(b"order")
+        for _ in range(10):
+            os.kill(pid, signal.SIGTERM)
+            time.sleep(0.01)
+        assert toy.hear() == b"rest"
+    finally:
+        io.close()
 
 
 HOST = """

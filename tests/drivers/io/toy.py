@@ -2,6 +2,7 @@
 
 import socket
 import struct
+import time
 
 import numpy as np
 
@@ -17,6 +18,7 @@ MEMORY = channels.MemorySpec((channels.RingSpec("samples", SAMPLE, 64),), (), 4)
 class ToySettings(Settings):
     path: str  # of the other side's socket
     hang: str = ""  # which call never returns
+    rest_s: float = 0.0  # how long it takes to rest
 
 
 class ToySession:
@@ -61,6 +63,7 @@ class ToySession:
 
     def rest(self):
         if self._wire is not None:
+            time.sleep(self._settings.rest_s)
             self._wire.send(b"rest")
 
     def clear_faults(self):
