@@ -40,10 +40,16 @@ class ConstantVelocity:
         return Motion(state, covariance)
 
 
-def corrected(motion: Motion, position_m: F64, sigma_m: float) -> Motion:
-    """Return the motion after a position, shape (2,), was measured with a standard deviation per axis."""
-    state, covariance = update(motion.state, motion.covariance, position_m, sigma_m**2 * PLANE, POSITION)
+def corrected(motion: Motion, position_m: F64, covariance_m2: F64) -> Motion:
+    """Return the motion after a position, shape (2,), was measured with a covariance, shape (2, 2)."""
+    state, covariance = update(motion.state, motion.covariance, position_m, covariance_m2, POSITION)
     return Motion(state, 0.5 * (covariance + covariance.T))
+
+
+def squared_distance(motion: Motion, position_m: F64, covariance_m2: F64) -> float:
+    """Return the squared Mahalanobis distance of a measured position, shape (2,), with a covariance, shape (2, 2)."""
+    offset = position_m - motion.state[:2]
+    return float(offset @ np.linalg.solve(motion.covariance[:2, :2] + covariance_m2, offset))
 
 
 def squared_distances(motion: Motion, positions_m: F64, sigmas_m: F64) -> F64:

@@ -19,6 +19,7 @@ from estimators.estimator import EstimatorSetup
 from estimators.grid_filter import GridFilter
 from estimators.joint_state import pack_joints, unpack_joints
 from estimators.labelling import FrameLabels, FrameSource
+from estimators.marker_settings import MarkerSettings
 from estimators.memory import MemorySettings, memory_of
 from estimators.odometry import Odometry, OdometryEstimate, latest_valid_ns
 from estimators.odometry_choice import OdometrySettings, build_odometry
@@ -30,6 +31,7 @@ from estimators.truth_odometry import TruthOdometry
 from estimators.truth_tracks import tracks_from_truth
 
 if TYPE_CHECKING:
+    from estimators.marker_tracking import MarkerTracker
     from estimators.tracking import GridTracker
 
 
@@ -37,7 +39,7 @@ class StandardSettings(Settings):
     """What each part of the standard estimator is set to."""
 
     pose: Literal["odometry", "truth"] = Field(default="odometry", description="where the pose comes from")
-    tracks: Literal["none", "truth", "grid"] = Field(default="none", description="where tracks of obstacles come from")
+    tracks: Literal["none", "truth", "grid", "aruco"] = Field(default="none", description="where tracks of obstacles come from")
     source: Literal["depth", "scan"] = Field(default="depth", description="which sensor the grid is made from")
     cell_m: float = Field(default=0.05, ge=0.01, le=0.5, description="side of a cell of grid and clearance field")
     odometry: OdometrySettings = OdometrySettings()
@@ -46,6 +48,7 @@ class StandardSettings(Settings):
     memory: MemorySettings = MemorySettings()
     clearance: ClearanceSettings = ClearanceSettings()
     tracking: TrackingSettings = TrackingSettings()
+    markers: MarkerSettings = MarkerSettings()
     registration: RegistrationSettings = RegistrationSettings()
 
 
@@ -70,6 +73,7 @@ class StandardEstimator:
         self._memory = memory_of(settings.memory, settings.cell_m, setup.robot_radius_m)
         self._clearance = ClearanceEstimator(settings.clearance)
         self._tracker = _tracker_of(settings)
+        self._markers = _marker_tracker_of(settings)
         self._registration = _registration_of(settings, setup)
         self._grid = self._memory.grid
         self._frame_ns: int | None = None  # capture time of the newest frame used
@@ -90,6 +94,8 @@ class StandardEstimator:
         """Fold in all samples and return the belief at the tick; bad input is a fault in it."""
         odometry = self._odometry.update(sensed)
         valid = self._see(sensed)
+        if self._markers is not None:
+            valid &= self._markers.update(sensed.markers, latest_valid_ns(sensed), self._odometry.pose_at)
         if self._clearance.field is None or self._memory.strays(odometry.odom_from_base):
             self._memory.follow(odometry.odom_from_base)
             self._refresh(self._frame_ns or 0)
@@ -136,7 +142,8 @@ class StandardEstimator:
         assert field is not None  # `update` has seen to it
         stamp_ns = sensed.tick.start_ns
         joints_ns = None if self._joints is None else self._joints.stamp.captured_ns
-        captures = (odometry.newest_capture_ns, self._frame_ns, joints_ns)
+        markers_ns = None if self._markers is None else self._markers.stamp_ns
+        captures = (odometry.newest_capture_ns, self._frame_ns, joints_ns, markers_ns)
         return Belief(
             tick=sensed.tick.index,
             stamp_ns=stamp_ns,
@@ -156,6 +163,8 @@ class StandardEstimator:
     def _tracks(self, sensed: Sensed) -> tuple[Track, ...]:
         if self._tracker is not None:
             return self._tracker.tracks_at(sensed.tick.start_ns)
+        if self._markers is not None:
+            return self._markers.tracks_at(sensed.tick.start_ns)
         if self._settings.tracks == "none" or sensed.truth is None:
             return ()
         return tracks_from_truth(sensed.truth, self._map_from_odom.inverse())
@@ -168,6 +177,7 @@ class StandardEstimator:
             memory=np.frombuffer(self._memory.snapshot(), dtype=np.uint8),
             clearance=np.frombuffer(self._clearance.snapshot(), dtype=np.uint8),
             tracker=np.frombuffer(b"" if self._tracker is None else self._tracker.snapshot(), dtype=np.uint8),
+            markers=np.frombuffer(b"" if self._markers is None else self._markers.snapshot(), dtype=np.uint8),
             registration=np.frombuffer(b"" if self._registration is None else self._registration.snapshot(), dtype=np.uint8),
             frame_ns=np.array([] if self._frame_ns is None else [self._frame_ns], dtype=np.int64),
             joints=pack_joints(self._joints),
@@ -183,6 +193,8 @@ class StandardEstimator:
         self._clearance.restore(state["clearance"].tobytes())
         if self._tracker is not None:
             self._tracker.restore(state["tracker"].tobytes())
+        if self._markers is not None:
+            self._markers.restore(state["markers"].tobytes())
         if self._registration is not None:
             self._registration.restore(state["registration"].tobytes())
         self._grid = self._memory.grid
@@ -196,6 +208,14 @@ def _tracker_of(settings: StandardSettings) -> GridTracker | None:
     from estimators.tracking import GridTracker  # noqa: PLC0415 - FilterPy brings 40 MB that only those who filter need carry
 
     return GridTracker(settings.tracking)
+
+
+def _marker_tracker_of(settings: StandardSettings) -> MarkerTracker | None:
+    if settings.tracks != "aruco":
+        return None
+    from estimators.marker_tracking import MarkerTracker  # noqa: PLC0415 - likewise
+
+    return MarkerTracker(settings.markers)
 
 
 def _registration_of(settings: StandardSettings, setup: EstimatorSetup) -> ScanRegistration | None:

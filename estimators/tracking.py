@@ -20,7 +20,7 @@ from drivers.interface.samples import frozen_array
 from drivers.interface.stateful import pack, unpack
 from estimators import segmentation
 from estimators.belief import F64, FREE, Lattice, OccupancyGrid, Track
-from estimators.constant_velocity import ConstantVelocity, Motion, corrected, squared_distances
+from estimators.constant_velocity import PLANE, ConstantVelocity, Motion, corrected, squared_distances
 from estimators.labelling import FrameLabels
 from estimators.remembered import Remembered
 from estimators.segmentation import Disc, Segment, centred, segments, surfaces_of
@@ -106,7 +106,8 @@ class GridTracker:
         settings, wider_m = self._settings, segment.disc.radius_m - track.radius_m
         gain = settings.radius_gain if wider_m > 0.0 else 0.1 * settings.radius_gain
         radius_m = max(track.radius_m + gain * wider_m, settings.radius_min_m)
-        motion = corrected(track.motion, centred(segment, radius_m, lattice), self._sigma_m(track, segment))
+        covariance = self._sigma_m(track, segment) ** 2 * PLANE
+        motion = corrected(track.motion, centred(segment, radius_m, lattice), covariance)
         seen_ns = self._stamp_ns if segment.loose else track.seen_ns  # or a track that met a wall's end would follow it
         return Followed(track.identity, motion, radius_m, track.hits + 1, seen_ns)
 

@@ -22,7 +22,7 @@ from runtime.sections import LoopSection, MissionSection, SupervisorSection
 from sim_drivers.world import WorldSettings
 
 S = TypeVar("S", bound=Settings)
-DEVICES = ("camera", "imu", "base", "arm", "scan", "operator", "truth")
+DEVICES = ("camera", "imu", "base", "arm", "scan", "operator", "truth", "markers")
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,9 @@ from runtime.log import plots, timing
 from runtime.log.read import Log, read
 
 F64 = NDArray[np.float64]
-_DEVICES = {"camera": "depth", "imu": "imu", "base": "base", "arm": "joints", "scan": "scans"}  # entity of its samples
+_DEVICES = {  # entity of its samples
+    "camera": "depth", "imu": "imu", "base": "base", "arm": "joints", "scan": "scans", "markers": "markers"
+}  # fmt: skip
 _BASE_AXES = ("vx", "vy", "wz")
 _POSE = ("x", "y", "yaw")
 

@@ -15,6 +15,7 @@ from drivers.interface.devices import (
     DeviceHealth,
     DeviceState,
     Imu,
+    MarkerCamera,
     MobileBase,
     Operator,
     RangeScanner,
@@ -40,6 +41,7 @@ class Devices:
     scan: RangeScanner | None = None
     operator: Operator | None = None
     truth: TruthSource | None = None
+    markers: MarkerCamera | None = None
 
     def __iter__(self) -> Iterator[tuple[str, Device]]:
         """Yield the devices that are there with their names, in a fixed order."""
@@ -98,6 +100,7 @@ class Robot:
             truth=self._ask("truth", d.truth.latest, None) if d.truth else None,
             health=tuple(self._health(name, device) for name, device in self._named),
             mission=self._mission.fold(events),
+            markers=self._ask("markers", d.markers.drain, ()) if d.markers else (),
         )
 
     def write(self, command: Command) -> None:

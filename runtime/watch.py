@@ -152,4 +152,5 @@ def _stamps(sensed: Sensed) -> dict[str, tuple[Stamp, ...]]:
         "base": tuple(sample.stamp for sample in sensed.base),
         "arm": tuple(sample.stamp for sample in sensed.joints),
         "scan": tuple(scan.stamp for scan in sensed.scans),
+        "markers": tuple(sample.stamp for sample in sensed.markers),
     }

@@ -9,10 +9,10 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from drivers.interface.devices import DeviceSetup
-from drivers.interface.geometry import BODY_FROM_OPTICAL, SE3
 from drivers.interface.samples import DepthFrame, Intrinsics, Stamp, frozen_array
 from drivers.interface.seeds import stream
 from drivers.interface.settings import Settings
+from sim_drivers.camera_mount import CameraMount
 from sim_drivers.depth_noise import DepthNoiseSettings, spoil
 from sim_drivers.ray_caster import RayCaster
 from sim_drivers.sensor import SimSensor
@@ -40,7 +40,7 @@ def intrinsics(width: int, height: int, horizontal_fov_deg: float | None = None)
     return Intrinsics(width, height, D455.fx * u, D455.fy * v, cx, cy)
 
 
-class DepthCameraSettings(Settings):
+class DepthCameraSettings(CameraMount):
     """Settings of the simulated depth camera; the mount is the camera body's (x forward, y left, z up) in base.
 
     Least range at 848x480: 0.33 m by the matcher's 126 px of disparity, "close to 34 cm" and "0.4 m" by Intel's own word
@@ -62,12 +62,6 @@ class DepthCameraSettings(Settings):
     latency_s: float = Field(default=0.04, ge=0.0, le=1.0, description="from capture to the host")
     loss_probability: float = Field(default=0.002, ge=0.0, le=1.0, description="of a whole frame")
     sees_robot: bool = Field(default=False, description="whether the robot's own body is in the picture")
-    x_m: float = Field(default=0.1, ge=-2.0, le=2.0, description="mount in base")
-    y_m: float = Field(default=0.0, ge=-2.0, le=2.0, description="mount in base")
-    z_m: float = Field(default=0.4, ge=0.0, le=3.0, description="mount above the floor")
-    roll_rad: float = Field(default=0.0, ge=-math.pi, le=math.pi, description="mount about x")
-    pitch_rad: float = Field(default=0.0, ge=-math.pi / 2, le=math.pi / 2, description="mount about y; positive looks down")
-    yaw_rad: float = Field(default=0.0, ge=-math.pi, le=math.pi, description="mount about z")
     noise: DepthNoiseSettings = DepthNoiseSettings()
 
     @model_validator(mode="after")
@@ -85,17 +79,16 @@ class SimDepthCamera(SimSensor[DepthFrame]):
     Settings: ClassVar[type[Settings]] = DepthCameraSettings
     role: ClassVar[str] = "camera"
 
-    def __init__(self, settings: DepthCameraSettings, setup: DeviceSetup) -> None:
-        """Register with the world.
+    def __init__(self, settings: DepthCameraSettings, setup: DeviceSetup, lens: Intrinsics | None = None) -> None:
+        """Register with the world; look through a given lens instead of that of the settings.
 
         Raises:
             ConfigurationError: there is no simulated world.
         """
         super().__init__(setup, settings.rate_hz, settings.latency_s, settings.loss_probability)
         self._settings = settings
-        self._intrinsics = intrinsics(settings.width, settings.height, settings.horizontal_fov_deg)
-        mount = (settings.x_m, settings.y_m, settings.z_m, settings.roll_rad, settings.pitch_rad, settings.yaw_rad)
-        self._base_from_optical = SE3.from_euler(*mount) @ BODY_FROM_OPTICAL
+        self._intrinsics = lens or intrinsics(settings.width, settings.height, settings.horizontal_fov_deg)
+        self._base_from_optical = settings.base_from_optical
         self._base_id = 0
         self._caster: RayCaster | None = None
 

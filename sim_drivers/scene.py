@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.interface.geometry import SE2
+from drivers.interface.geometry import SE2, SE3
 from drivers.interface.mission import Goal
+
+if TYPE_CHECKING:
+    from drivers.interface.marker_detector import DictionaryName
 
 
 class Kind(enum.Enum):
@@ -102,6 +106,20 @@ class Conveyor:
 
 
 @dataclass(frozen=True, slots=True)
+class MarkerPlate:
+    """A square fiducial marker, printed with a white margin, that sticks on something of the scene.
+
+    The marker's frame has its origin in the middle, x to the right and y upwards as printed, z out of the plate.
+    """
+
+    carrier: str  # the name of the obstacle, mover or conveyor's item; its origin is the solid's centre
+    carrier_from_marker: SE3
+    side_m: float  # of the black square
+    identity: int
+    dictionary: DictionaryName = "4X4_50"
+
+
+@dataclass(frozen=True, slots=True)
 class Scene:
     """A scenario that has been drawn for one seed."""
 
@@ -112,3 +130,4 @@ class Scene:
     static: tuple[StaticObstacle, ...]
     movers: tuple[Mover, ...] = ()
     conveyors: tuple[Conveyor, ...] = ()
+    markers: tuple[MarkerPlate, ...] = ()

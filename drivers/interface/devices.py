@@ -20,6 +20,7 @@ from drivers.interface.samples import (
     DepthFrame,
     ImuSample,
     JointSample,
+    MarkerSample,
     OperatorEvent,
     RangeScan,
     TruthSample,
@@ -80,9 +81,9 @@ class DeviceSetup:
 class Device(Protocol):
     """What every device can do.  A driver class is built as `Driver(settings, setup)`.
 
-    `role` is the name of the device it drives in a robot: camera, imu, base, arm, scan, operator or truth.  A driver that
-    lives in real time (hardware, an emulated device, a person) sets the class attribute `real_time = True`; the loop is then
-    paced by the host's clock.  One that plays what was recorded, and therefore obeys nobody, sets `plays_recording = True`.
+    `role` is the name of the device it drives in a robot: camera, markers, imu, base, arm, scan, operator or truth.  A driver
+    that lives in real time (hardware, an emulated device, a person) sets the class attribute `real_time = True`; the loop is
+    then paced by the host's clock.  One that plays what was recorded, and therefore obeys nobody, sets `plays_recording = True`.
     """
 
     Settings: ClassVar[type[Settings]]
@@ -132,6 +133,15 @@ class DepthCamera(Device, Protocol):
 
     def latest(self) -> DepthFrame | None:
         """Return the newest frame not yet returned, or None."""
+        ...
+
+
+@runtime_checkable
+class MarkerCamera(Device, Protocol):
+    """A camera that delivers the fiducial markers it sees."""
+
+    def drain(self) -> tuple[MarkerSample, ...]:
+        """Return what was seen in every image since the last call, oldest first."""
         ...
 
 

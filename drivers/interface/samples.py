@@ -73,6 +73,17 @@ class ColourFrame:
 
 
 @dataclass(frozen=True, slots=True)
+class MarkerSample:
+    """The fiducial markers in one camera image: what was detected, not the image; none seen is a sample too."""
+
+    stamp: Stamp
+    ids: tuple[int, ...]  # (n,)
+    corners_px: F64  # (n, 4, 2): of the black square, clockwise from its top left as printed; pixel centres are whole numbers
+    intrinsics: Intrinsics
+    base_from_optical: SE3
+
+
+@dataclass(frozen=True, slots=True)
 class ImuSample:
     """Body rates and specific force in the base frame."""
 

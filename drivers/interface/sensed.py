@@ -11,6 +11,7 @@ from drivers.interface.samples import (
     DepthFrame,
     ImuSample,
     JointSample,
+    MarkerSample,
     OperatorEvent,
     RangeScan,
     TruthSample,
@@ -44,3 +45,4 @@ class Sensed:
     truth: TruthSample | None
     health: tuple[DeviceHealth, ...]
     mission: Mission
+    markers: tuple[MarkerSample, ...] = ()

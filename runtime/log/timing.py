@@ -140,7 +140,7 @@ def _input_age_ms(cycle: Cycle) -> Values:
 def _newest_ns(cycle: Cycle) -> dict[str, int]:
     """Return when the newest sample of each device that delivered was taken [ns]."""
     s = cycle.sensed
-    newest = {"imu": s.imu, "base": s.base, "arm": s.joints, "scan": s.scans}
+    newest = {"imu": s.imu, "base": s.base, "arm": s.joints, "scan": s.scans, "markers": s.markers}
     single = {"camera": s.depth, "truth": s.truth}
     return {name: samples[-1].stamp.captured_ns for name, samples in newest.items() if samples} | {
         name: sample.stamp.captured_ns for name, sample in single.items() if sample is not None

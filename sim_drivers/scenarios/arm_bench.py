@@ -10,12 +10,13 @@ import math
 
 from pydantic import Field
 
-from drivers.interface.geometry import SE2
+from drivers.interface.geometry import SE2, SE3
 from drivers.interface.seeds import stream
 from drivers.interface.settings import Settings
-from sim_drivers.scene import Conveyor, Scene, Shape, StaticObstacle
+from sim_drivers.scene import Conveyor, MarkerPlate, Scene, Shape, StaticObstacle
 
 BOX = Shape.box(0.08, 0.08, 0.10)
+MARKER_SIDE_M = 0.05  # on top of a box, its margin of 8 mm inside the edges
 END_M = 0.15  # from the belt's beginning to the first box
 
 
@@ -34,7 +35,10 @@ class ArmBenchSettings(Settings):
 
 
 class ArmBench:
-    """A conveyor with boxes in front of an arm; there is nowhere to go, the arm's planner knows what to do."""
+    """A conveyor with boxes in front of an arm; there is nowhere to go, the arm's planner knows what to do.
+
+    On top of each box its number is printed as an ArUco marker.
+    """
 
     Settings = ArmBenchSettings
 
@@ -58,4 +62,6 @@ class ArmBench:
         )
         belt = Shape.box(s.belt_length_m, s.belt_width_m, s.belt_height_m)
         conveyor = Conveyor("conveyor", belt, map_from_belt, abs(s.belt_speed_m_s), boxes)
-        return Scene("arm_bench", SE2(), (), s.time_limit_s, (), conveyors=(conveyor,))
+        top = SE3(0.0, 0.0, BOX.half_extents_m[2])
+        markers = tuple(MarkerPlate(box.name, top, MARKER_SIDE_M, number) for number, box in enumerate(boxes))
+        return Scene("arm_bench", SE2(), (), s.time_limit_s, (), conveyors=(conveyor,), markers=markers)

@@ -20,6 +20,7 @@ from drivers.interface.devices import (
     DepthCamera,
     DeviceSetup,
     Imu,
+    MarkerCamera,
     MobileBase,
     Operator,
     RangeScanner,
@@ -30,6 +31,7 @@ from drivers.interface.samples import (
     DepthFrame,
     ImuSample,
     JointSample,
+    MarkerSample,
     OperatorEvent,
     PoseSample,
     RangeScan,
@@ -52,6 +54,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
 ROLE = {
     DepthFrame: DepthCamera,
     ImuSample: Imu,
+    MarkerSample: MarkerCamera,
     RangeScan: RangeScanner,
     WheelSample: MobileBase,
     PoseSample: MobileBase,

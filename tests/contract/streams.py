@@ -8,7 +8,7 @@ import numpy as np
 
 from drivers.interface.commands import BaseLimits, BodyTwist, Command
 from drivers.interface.devices import DeviceSetup
-from drivers.interface.geometry import SE2
+from drivers.interface.geometry import SE2, SE3
 from drivers.interface.kinematics import WheelKinematics
 from drivers.interface.mission import Goal, Mission
 from drivers.interface.samples import frozen_array
@@ -21,7 +21,7 @@ from planners.routers.grid import GridRouter
 from runtime.mission import MissionTracker
 from runtime.registry import Part, load
 from runtime.robot import Devices, Robot
-from sim_drivers.scene import Mover, Scene, Shape, StaticObstacle
+from sim_drivers.scene import MarkerPlate, Mover, Scene, Shape, StaticObstacle
 from sim_drivers.world import MujocoWorld, WorldSettings
 from tests.contract.facts import arrays
 from tests.planners.synthetic import Disc, belief_of
@@ -42,6 +42,7 @@ SCENE = Scene(
         StaticObstacle("pillar", Shape.cylinder(0.15, 1.0), SE2(2.2, -0.6)),
     ),
     movers=(Mover("walker", Shape.cylinder(0.25, 1.7), np.array([[0.0, 3.0, 1.0, 0.0], [9.0, 0.5, -1.5, 0.0]])),),
+    markers=(MarkerPlate("walker", SE3.from_euler(-0.25, 0.0, -0.45, math.pi / 2, 0.0, -math.pi / 2), 0.15, 4),),
 )
 
 
@@ -70,6 +71,7 @@ def stream(base: str) -> Stream:
     """Drive an s-curve, sideways too where the base can."""
     world = build_world()
     kinds = {"camera": "sim_depth", "imu": "sim_imu", "scan": "sim_scan", "operator": "script", "truth": "sim_truth"}
+    kinds["markers"] = "sim_markers"
     devices = Devices(**{name: device_of(driver, world, name) for name, driver in {"base": BASES[base], **kinds}.items()})
     world.compile()
     robot, limits = Robot(devices, MissionTracker(MISSION)), devices.base.limits

@@ -23,6 +23,7 @@ VARIANTS: dict[str, tuple[dict[str, Any], ...]] = {
         {"pose": "truth", "tracks": "truth"},
         {"memory": {"kind": "layers"}, "depth": {"filtered": True}, "tracks": "grid"},
         {"registration": {"enabled": True}},
+        {"tracks": "aruco", "markers": {"side_m": 0.15}},
     ),
 }
 NAN, INF = math.nan, math.inf

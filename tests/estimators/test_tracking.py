@@ -264,7 +264,7 @@ def test_constant_velocity_in_closed_form():
     prior = np.array([[0.04 + 0.01, 0.1], [0.1, 1.0]]) + q
     np.testing.assert_allclose(carried.covariance[::2, ::2], prior)
     np.testing.assert_allclose(carried.covariance[0::2, 1::2], 0.0)
-    measured = corrected(carried, np.array([1.15, 1.95]), 0.1)
+    measured = corrected(carried, np.array([1.15, 1.95]), 0.01 * np.eye(2))
     gain = prior[:, 0] / (prior[0, 0] + 0.01)
     np.testing.assert_allclose(measured.state[[0, 2]], [1.05, 0.5] + gain * 0.1)
     np.testing.assert_allclose(measured.covariance[0, 0], prior[0, 0] * (1.0 - gain[0]))

@@ -15,6 +15,7 @@ from drivers.interface.samples import (
     ImuSample,
     Intrinsics,
     Jog,
+    MarkerSample,
     NewGoal,
     ObstacleTruth,
     OperatorEvent,
@@ -125,7 +126,16 @@ def _sensed(index: int, period_ns: int, intrinsics: Intrinsics) -> Sensed:
         truth,
         health,
         Mission(SE2(), (Goal(7.0, 0.0),)),
+        _markers(index, start, intrinsics),
     )
+
+
+def _markers(index: int, start: int, intrinsics: Intrinsics) -> tuple[MarkerSample, ...]:
+    """None, or an image with as many markers as its number allows."""
+    count = index % 3
+    corners = frozen_array(stream(3, "markers", index).uniform(size=(count, 4, 2)))
+    sample = MarkerSample(Stamp(start - 60_000_000, start, index), tuple(range(count)), corners, intrinsics, CAMERA)
+    return (sample,) if index % 4 else ()
 
 
 def _cycle(index: int, count: int, sensed: Sensed, before: Cycle | None) -> Cycle:

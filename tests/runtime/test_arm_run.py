@@ -171,3 +171,16 @@ def test_an_arm_on_a_mobile_base_is_one_robot(wheels):
     assert np.abs(bench.joints(2.5)[0] - GOAL).max() < 0.01
     assert not bench.faults()
     assert 0.4 < bench.cycles[-1].belief.odom_from_base.x < 0.75
+
+
+def test_boxes_with_markers_are_followed_beneath_a_camera() -> None:
+    watched = Bench(lambda _: None)
+    watched.run("arm_bench_markers", seconds=2.0)
+    last = watched.cycles[-1]
+    assert last.sensed.truth is not None
+    truth = {int(box.name.removeprefix("box_")): box for box in last.sensed.truth.obstacles}
+    assert {track.identity for track in last.belief.tracks} >= {1, 2}  # box 0 comes into the picture only now
+    for track in last.belief.tracks:
+        box = truth[track.identity]
+        assert track.position_in_odom == pytest.approx((box.map_from_obstacle.x, box.map_from_obstacle.y), abs=0.02)
+        assert track.velocity_in_odom == pytest.approx(box.velocity_m_s, abs=0.05)
