@@ -1,0 +1,73 @@
+"""An emulated FCI controller in a process of its own: pylibfranka holds the interpreter's lock while it waits for it."""
+
+import json
+import os
+import random
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from drivers.interface.geometry import SE2
+from sim_drivers.firmware.fci_controller import FciController
+from sim_drivers.firmware.fci_lockstep import run_lockstep
+from sim_drivers.firmware.firmware import FirmwareSetup, LockstepHost
+from sim_drivers.scene import Scene
+from sim_drivers.world import MujocoWorld, WorldSettings
+
+ROOT = Path(__file__).parents[3]
+
+
+@dataclass(frozen=True)
+class Wire:
+    """What a franka driver's settings would say."""
+
+    host: str
+
+
+def controller_of(host: str, seed: int = 1, scene: Scene | None = None, **settings: Any) -> tuple[MujocoWorld, FciController]:
+    """Return a compiled world with a controller in it."""
+    world = MujocoWorld(scene or Scene("bench", SE2(), (), 60.0, ()), WorldSettings())
+    setup = FirmwareSetup("arm", seed, world, LockstepHost(world))
+    controller = FciController(Wire(host), FciController.Settings(**settings), setup)
+    world.compile()
+    return world, controller
+
+
+def free_host() -> str:
+    """Return a loopback address on which nobody listens: the port is the protocol's."""
+    draw = random.SystemRandom()
+    while True:
+        host = f"127.{draw.randrange(1, 255)}.{draw.randrange(256)}.{draw.randrange(1, 255)}"
+        with socket.socket() as listener, suppress(OSError):
+            listener.bind((host, 1337))
+            return host
+
+
+@contextmanager
+def lockstep_server(seed: int = 1, **settings: Any) -> Iterator[str]:
+    """Serve in lockstep within the block; yields the address."""
+    host = free_host()
+    told = [sys.executable, "-m", "tests.sim_drivers.firmware.fcibench", host, str(seed), json.dumps(settings)]
+    with subprocess.Popen(told, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout.readline() == "ready\n"
+            yield host
+        finally:
+            process.kill()
+
+
+def main() -> None:
+    parent = os.getppid()
+    world, controller = controller_of(sys.argv[1], int(sys.argv[2]), **json.loads(sys.argv[3]))
+    controller.open()
+    print("ready", flush=True)
+    run_lockstep(world, controller, lambda: os.getppid() != parent)
+
+
+if __name__ == "__main__":
+    main()
