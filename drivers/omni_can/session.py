@@ -51,6 +51,7 @@ class OmniCanSession:
         self._wire: Wire | None = None
         self._began_ns: int | None = None  # the first poll after `open`
         self._since_ns = 0  # when the phase began
+        self._rates: tuple[float, ...] = ZERO  # of the newest order
         self._brakes = False  # zero is repeated
         self._brake_until_ns: int | None = None
         self._last_zero_ns = 0
@@ -99,15 +100,15 @@ class OmniCanSession:
         self._tell()
 
     def send(self, values: NDArray[np.float64], now_ns: int) -> None:
-        """Send motor rates [turn/s], shape (3,); while the axes are being armed, zero."""
-        self._brakes = False
+        """Send motor rates [turn/s], shape (3,); while the axes are being armed zero, and the rates once they are."""
+        self._brakes, self._rates = False, tuple(values.tolist())
         if self._phase is Phase.READY:
             self._enter(Phase.ARMING, now_ns)
             self._axes.arm()
         elif self._phase is Phase.ARMING:
             self._axes.send_rates(ZERO)
         elif self._phase is Phase.DRIVING:
-            self._axes.send_rates(tuple(values.tolist()))
+            self._axes.send_rates(self._rates)
 
     def rest(self) -> None:
         """Send zero now, and go on braking for a while."""
@@ -151,7 +152,8 @@ class OmniCanSession:
             case Phase.TRIAL:
                 self._await_trip(now_ns)
             case Phase.ARMING:
-                self._await_closed_loop(now_ns, Phase.DRIVING)
+                if self._await_closed_loop(now_ns, Phase.DRIVING) and not self._brakes:
+                    self._axes.send_rates(self._rates)
             case Phase.DRIVING:
                 fallen = [axis for axis in self._axes.each if not axis.is_closed_loop]
                 if fallen:
@@ -172,12 +174,14 @@ class OmniCanSession:
         else:
             self._be_ready()
 
-    def _await_closed_loop(self, now_ns: int, then: Phase) -> None:
+    def _await_closed_loop(self, now_ns: int, then: Phase) -> bool:
+        """Go on once all are armed; return whether they are."""
         fallen = [axis for axis in self._axes.each if not axis.is_closed_loop]
         if not fallen:
             self._enter(then, now_ns)
         elif now_ns - self._since_ns > ARMING_NS:
             self._fail(f"{fallen[0].name} cannot be armed: {fallen[0].condition}")
+        return not fallen
 
     def _await_trip(self, now_ns: int) -> None:
         """Stay silent: a watchdog that is what the settings say has tripped by now."""

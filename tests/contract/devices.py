@@ -4,13 +4,15 @@ import math
 import os
 import pty
 import sys
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -26,7 +28,7 @@ from drivers.interface.devices import (
     RangeScanner,
     TruthSource,
 )
-from drivers.interface.errors import DeviceError
+from drivers.interface.errors import DeviceError, TrundleError
 from drivers.interface.samples import (
     DepthFrame,
     ImuSample,
@@ -40,6 +42,7 @@ from drivers.interface.samples import (
 )
 from runtime.registry import Part, load
 from sim_drivers.world import MujocoWorld
+from tests.contract.rigs import RIGS, FreeRunning
 from tests.contract.streams import build_world, device_of
 
 DATA = Path(__file__).parents[1] / "data"
@@ -53,8 +56,8 @@ SETTINGS: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 ROLE = {
     DepthFrame: DepthCamera,
-    ImuSample: Imu,
     MarkerSample: MarkerCamera,
+    ImuSample: Imu,
     RangeScan: RangeScanner,
     WheelSample: MobileBase,
     PoseSample: MobileBase,
@@ -70,12 +73,17 @@ class Bench:
 
     device: Any
     world: MujocoWorld
+    elsewhere: FreeRunning | None = None  # the world goes by in real time, and the device is at the other end of a wire
     clock_fails: bool = False
+
+    @property
+    def free_running(self) -> bool:
+        return self.elsewhere is not None
 
     def now_ns(self) -> int:
         if self.clock_fails:
             raise DeviceError("the clock has failed")
-        return self.world.now_ns
+        return time.monotonic_ns() if self.free_running else self.world.now_ns
 
     @property
     def is_base(self) -> bool:
@@ -84,19 +92,32 @@ class Bench:
     @property
     def is_in_world(self) -> bool:
         """Whether what it does can be seen in the world (a recording drove elsewhere)."""
-        return hasattr(self.device, "act")
+        return hasattr(self.device, "act") or self.free_running
 
     def open(self) -> None:
         """Open it; hardware that is not there ends the test."""
         try:
             self.device.open()
         except DeviceError as error:
-            if not getattr(self.device, "real_time", False):
+            if self.free_running or not getattr(self.device, "real_time", False):
                 raise
             pytest.skip(str(error))
 
+    def fail(self) -> None:
+        """Let it meet an error: its device vanishes, or its clock."""
+        if self.elsewhere is None:
+            self.clock_fails = True
+            with suppress(TrundleError):
+                self.read()
+        else:
+            self.elsewhere.vanish()
+            self.wait(0.6)
+
     def wait(self, seconds: float) -> None:
-        self.world.step_to(self.world.now_ns + round(seconds * 1e9))
+        if self.free_running:
+            time.sleep(seconds)
+        else:
+            self.world.step_to(self.world.now_ns + round(seconds * 1e9))
 
     def read(self) -> tuple[Any, ...]:
         """Return what it delivers now."""
@@ -112,10 +133,10 @@ class Bench:
         self.wait(0.02)
         start = self.read()[-1].position_rad
         knots = np.stack((start, start + value * np.eye(len(start))[0]))
-        return JointTrajectory(self.world.now_ns, np.array([0.0, 2.0]), knots, np.zeros_like(knots))
+        return JointTrajectory(self.now_ns(), np.array([0.0, 2.0]), knots, np.zeros_like(knots))
 
     def command(self, order: BodyTwist | JointTrajectory, lifetime_s: float) -> None:
-        self.device.command(order, self.world.now_ns + round(lifetime_s * 1e9))
+        self.device.command(order, self.now_ns() + round(lifetime_s * 1e9))
 
     def run(self, seconds: float) -> list[Any]:
         """Let time pass in ticks, keep it moving where it moves, and return all that it delivers."""
@@ -128,24 +149,34 @@ class Bench:
         return samples
 
     def displacement(self, seconds: float) -> float:
-        """Return how far anything in the world goes in so much time [m or rad]."""
-        before = self.world.data.qpos.copy()
+        """Return how far anything but the loose rollers of a wheel goes in so much time [m or rad]."""
+        model = self.world.model
+        hinges = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE)
+        loose = [model.jnt_qposadr[joint] for joint in hinges if not model.joint(joint).name]
+        before = np.delete(self.world.data.qpos, loose)
         self.wait(seconds)
-        return float(np.abs(self.world.data.qpos - before).max(initial=0.0))
+        return float(np.abs(np.delete(self.world.data.qpos, loose) - before).max(initial=0.0))
 
 
 @contextmanager
-def bench(driver: str, seed: int = 5, **settings: Any) -> Iterator[Bench]:
-    """Build a device with a pseudo-terminal as standard input; what does not move rides on a base that drives a curve."""
-    cls, world = load(Part.DRIVER, driver), build_world()
-    tested = Bench(None, world)
-    tested.device = cls(cls.Settings(**(SETTINGS.get(driver, {}) | settings)), DeviceSetup("tested", seed, tested.now_ns, world))
+def bench(driver: str, seed: int = 5, *, missing: bool = False, **settings: Any) -> Iterator[Bench]:
+    """Build a device with a pseudo-terminal as standard input; what does not move rides on a base that drives a curve.
+
+    A real driver whose device can be emulated has it at the other end of the wire, unless it is `missing`, and the world goes by
+    in real time.
+    """
+    cls, world, rig = load(Part.DRIVER, driver), build_world(), RIGS[driver]() if driver in RIGS else None
+    own = {} if rig is None else rig.driver | (rig.hasty if missing else {})
+    chosen = cls.Settings(**(SETTINGS.get(driver, {}) | own | settings))
+    elsewhere = None if rig is None or missing else FreeRunning(driver, chosen, rig, world, seed)
+    tested = Bench(None, world, elsewhere)
+    tested.device = cls(chosen, DeviceSetup("tested", seed, tested.now_ns, None if rig else world))
     carrier = None if tested.is_base else device_of("sim_omni", world, "carrier")
     world.compile()
     if carrier is not None and not hasattr(cls, "command"):
         carrier.open()
         carrier.command(BodyTwist(0.2, 0.1, math.pi / 10), 10**18)
-    with terminal():
+    with terminal(), nullcontext() if elsewhere is None else elsewhere.running():
         try:
             yield tested
         finally:

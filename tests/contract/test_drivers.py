@@ -16,8 +16,10 @@ from drivers.interface.errors import DeviceError, TrundleError
 from runtime.registry import Part, load, names
 from tests.contract.devices import ROLE, Bench, bench
 from tests.contract.facts import arrays, facts, forget_kernels, signatures
+from tests.contract.rigs import RIGS
 
 DRIVERS = names(Part.DRIVER)
+IN_LOCKSTEP = [name for name in DRIVERS if name not in RIGS]
 STILL = 1e-3  # m or rad in half a second
 
 
@@ -62,7 +64,7 @@ def test_reads_nothing_unless_open(tested):
     assert tested.read() == ()
 
 
-@pytest.mark.parametrize("state", ["never opened", "half open", "open", "running", "stopped", "closed", "opened again"])
+@pytest.mark.parametrize("state", ["never opened", "half open", "open", "running", "stopped", "failed", "closed", "opened again"])
 def test_stops_closes_and_says_how_it_stands_in_every_state(tested, state):
     device = tested.device
     if state == "half open":
@@ -75,6 +77,8 @@ def test_stops_closes_and_says_how_it_stands_in_every_state(tested, state):
         tested.run(0.2)
     if state == "stopped":
         device.stop()
+    if state == "failed":
+        tested.fail()
     if state in {"closed", "opened again"}:
         device.close()
     if state == "opened again":
@@ -98,18 +102,22 @@ def test_what_failed_to_open_can_be_opened_later(tested):
 
 def test_says_in_one_sentence_why_it_cannot_open(driver, monkeypatch):
     nowhere = {"path": Path("no/such/place")} if driver.startswith("recorded") else {}
-    with bench(driver, **nowhere) as tested:
+    with bench(driver, missing=True, **nowhere) as tested:
         monkeypatch.setattr(sys, "stdin", None)
         try:
             tested.device.open()
         except TrundleError as error:
             sentence = str(error)
         else:
+            assert driver not in RIGS
             return  # it always opens
+        for act in (tested.device.stop, tested.device.stop, tested.device.close, tested.device.close):
+            act()
     assert "tested" in sentence or "no/such/place" in sentence
     assert "\n" not in sentence
 
 
+@pytest.mark.parametrize("driver", IN_LOCKSTEP)
 def test_counters_run_from_open(tested):
     tested.open()
     fresh = tested.device.health()
@@ -126,7 +134,7 @@ def test_samples_are_stamped_in_order(tested):
     for _ in range(40):
         tested.wait(0.05)
         new = [sample.stamp for sample in tested.read()]
-        assert all(s.captured_ns <= s.received_ns <= tested.world.now_ns for s in new)
+        assert all(s.captured_ns <= s.received_ns <= tested.now_ns() for s in new)
         stamps += [s for s in new if s not in stamps]
     assert stamps
     assert all(a.captured_ns < b.captured_ns for a, b in pairwise(stamps))
@@ -146,6 +154,7 @@ def test_samples_own_their_arrays(tested):
     assert [facts(sample) for sample in samples] == seen
 
 
+@pytest.mark.parametrize("driver", IN_LOCKSTEP)
 def test_nothing_is_new_when_no_time_passes(tested):
     tested.open()
     tested.wait(0.3)
@@ -154,6 +163,7 @@ def test_nothing_is_new_when_no_time_passes(tested):
         assert {sample.stamp.sequence for sample in tested.read()} <= before
 
 
+@pytest.mark.parametrize("driver", IN_LOCKSTEP)
 def test_equal_worlds_and_seeds_give_equal_samples(driver):
     runs = []
     for _ in range(2):

@@ -1,0 +1,74 @@
+"""What a real driver is tested against: its device, emulated, in a world that goes by in real time beside the test.
+
+A driver that has firmware needs no more than an entry in `RIGS`: its settings, with ports of its own, and its firmware's.
+"""
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+from runtime.emulate import FreeRun
+from runtime.registry import Part, load
+from sim_drivers.firmware.firmware import FirmwareSetup
+from sim_drivers.world import MujocoWorld
+from tests.faults.emulated import GROUP, free_port
+
+
+@dataclass(frozen=True)
+class Rig:
+    """Settings of both ends of a wire."""
+
+    driver: dict[str, Any]
+    firmware: dict[str, Any] = field(default_factory=dict)
+    hasty: dict[str, Any] = field(default_factory=dict)  # settings of a driver that soon gives a missing device up
+
+
+def omni_can() -> Rig:
+    bus = {"interface": "udp_multicast", "channel": GROUP, "port": free_port()}
+    settings = {"bus": bus, "verify_watchdog": False, "connect_s": 20.0, "watchdog_s": 2.0}
+    return Rig(settings, {"boot_s": 0.0, "axis": {"watchdog_s": 2.0}}, hasty={"connect_s": 0.3})
+
+
+def emulated_truth() -> Rig:
+    return Rig({"port": free_port()}, hasty={"open_timeout_s": 0.3})
+
+
+RIGS: dict[str, Callable[[], Rig]] = {  # by the driver's name
+    "omni_can": omni_can,
+    "emulated_truth": emulated_truth,
+}
+
+
+class FreeRunning:
+    """A world and its firmware in real time, in a thread."""
+
+    def __init__(self, driver: str, driver_settings: object, rig: Rig, world: MujocoWorld, seed: int) -> None:
+        """Join the world, which is compiled later."""
+        cls = load(Part.FIRMWARE, driver)
+        self._run = FreeRun(world)
+        self._firmware = cls(driver_settings, cls.Settings(**rig.firmware), FirmwareSetup("tested", seed, world, self._run))
+        self._over = threading.Event()
+
+    @contextmanager
+    def running(self) -> Iterator[None]:
+        """Within the block the wire is bound and time passes."""
+        self._firmware.open()
+        self._thread = threading.Thread(target=self._step)
+        self._thread.start()
+        try:
+            yield
+        finally:
+            self.vanish()
+
+    def vanish(self) -> None:
+        """Be gone."""
+        self._over.set()
+        self._thread.join()
+        self._firmware.close()
+
+    def _step(self) -> None:
+        self._run.start()
+        while not self._over.is_set():
+            self._run.step()
