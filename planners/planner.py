@@ -45,6 +45,7 @@ class Plan:
     path_in_odom: NDArray[np.float64] = field(default_factory=no_path)  # (n, 2), what it means to do; for display only
     diagnostics: Diagnostics = field(default_factory=Diagnostics)
     latency_ns: int = 0  # how long after the belief the command is meant to take effect
+    accomplished: bool | None = None  # of a mission that the planner itself holds; None: it holds none
 
 
 @runtime_checkable

@@ -15,7 +15,7 @@ from runtime.realtime import realtime
 from sim_drivers.firmware.firmware import Firmware, FirmwareSetup
 from sim_drivers.world import SECOND_NS, MujocoWorld
 
-CATCH_UP_NS = 20_000_000  # a hiccup so long is caught up, step by step; of a longer one the rest is lost
+CATCH_UP_NS = 20_000_000  # of a hiccup, step by step, unless a firmware's `catch_up_ns` is less
 LOWEST_FACTOR = 0.98  # of real time; below it a run is void
 WATCH_NS = 2 * SECOND_NS  # the factor is judged over so long
 
@@ -38,6 +38,7 @@ class FreeRun:
 
     def __init__(self, world: MujocoWorld, clock: Clock | None = None) -> None:
         """Take a world that is compiled later; its time zero is now until `start`."""
+        self.catch_up_ns = CATCH_UP_NS  # a hiccup so long is caught up; of a longer one the rest is lost
         self._world = world
         self._clock = RealClock() if clock is None else clock
         self._anchor_ns = self._clock.now_ns()
@@ -70,7 +71,7 @@ class FreeRun:
         step_ns = self._world.step_ns
         self._clock.sleep_until(self.now_ns + step_ns)
         behind_ns = self._clock.now_ns() - self.now_ns
-        if behind_ns > CATCH_UP_NS:
+        if behind_ns > self.catch_up_ns:
             self.late_ns += behind_ns - step_ns
             self._anchor_ns += behind_ns - step_ns
         self._world.step_to(self._clock.now_ns() - self._anchor_ns)
@@ -109,6 +110,7 @@ def build(configuration: Configuration, seed: int, clock: Clock | None = None) -
         (name, choice.name, choice.cls(drivers[name].settings, choice.settings, FirmwareSetup(name, seed, world, run)))
         for name, choice in configuration.emulation
     )
+    run.catch_up_ns = min((getattr(part, "catch_up_ns", CATCH_UP_NS) for _, _, part in firmware), default=CATCH_UP_NS)
     world.compile()
     return Emulation(configuration.scenario, world, run, firmware)
 

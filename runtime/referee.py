@@ -94,13 +94,13 @@ class Referee:
             return Outcome.INTERRUPTED
         if truth is not None and (truth.contacts or truth.clearance_m <= 0.0):
             return Outcome.COLLIDED
-        if arrived:
+        if arrived or cycle.plan.accomplished:
             return Outcome.REACHED
         if self._latched_since_ns is not None and now_ns - self._latched_since_ns >= self._give_up_ns:
             return Outcome.STOPPED
         ended = any(health.state is DeviceState.ENDED for health in cycle.sensed.health)
         if ended or now_ns - (self.tally.start_ns or 0) >= self._time_limit_ns:
-            return Outcome.REACHED if self._observing else Outcome.TIMED_OUT
+            return Outcome.REACHED if self._observing and cycle.plan.accomplished is None else Outcome.TIMED_OUT
         return None
 
     def _since(self, latched: bool, now_ns: int) -> int | None:

@@ -55,7 +55,8 @@ class FirmwareSetup:
 class Firmware(Part, Protocol):
     """Stands in for what a real driver talks to.  Built as `Firmware(driver_settings, settings, setup)`.
 
-    `open` raises DeviceError with one sentence when the wire cannot be bound.  `act` never blocks.
+    `open` raises DeviceError with one sentence when the wire cannot be bound.  `act` never blocks.  One whose client must answer
+    each cycle sets the class attribute `catch_up_ns`, the longest hiccup of the host that may come as a burst of cycles.
     """
 
     Settings: ClassVar[type[Settings]]

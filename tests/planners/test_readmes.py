@@ -4,13 +4,21 @@ import pytest
 
 import planners
 from planners.dwa.planner import DynamicWindow
+from planners.joint_waypoints.planner import JointWaypoints
 from planners.point_ds.planner import PointAttractor
 from planners.routers.grid import GridRouter
 from planners.shields.field_cbf import FieldCbf
 
 
 @pytest.mark.parametrize(
-    ("folder", "part"), [("dwa", DynamicWindow), ("point_ds", PointAttractor), ("routers", GridRouter), ("shields", FieldCbf)]
+    ("folder", "part"),
+    [
+        ("dwa", DynamicWindow),
+        ("point_ds", PointAttractor),
+        ("joint_waypoints", JointWaypoints),
+        ("routers", GridRouter),
+        ("shields", FieldCbf),
+    ],
 )
 def test_readme_names_every_setting_and_its_default(folder, part):
     text = (Path(planners.__file__).parent / folder / "README.md").read_text()
