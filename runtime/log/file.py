@@ -1,4 +1,8 @@
-"""The file of a log: a thread of its own fills it from a pipe, keeps it on the disk and sums it up."""
+"""The file of a log: one thread fills it from a pipe and sums it up, another one keeps it on the disk.
+
+What was written survives the process, and what was forced onto the disk survives the machine; the first must not wait for the
+second, which takes as long as the disk likes.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +23,7 @@ _POLL_S = 0.001
 
 
 class LogFile:
-    """A file that is written, and forced onto the disk every `sync_interval_s`, by its own thread.
+    """A file that is written at once, and forced onto the disk every `sync_interval_s`, by its own threads.
 
     An error is kept as a sentence, and the pipe drained all the same.
     """
@@ -37,14 +41,18 @@ class LogFile:
         self._idle = threading.Event()
         self._idle.set()
         self._sync_pause_s = sync_interval_s / 2  # so that what came just after one is still in time with the next
-        self._synced_s = time.monotonic()
         self._unsynced_s: float | None = None  # since when something waits to be forced onto the disk
+        self._ended = threading.Event()
         self.fault = ""
         self.bytes_written = 0
         self.crc32 = 0  # of all bytes written
         self.longest_sync_s = 0.0  # that something waited until it was on the disk
-        self._thread = threading.Thread(target=self._pump, name="log-file", daemon=True)
-        self._thread.start()
+        self._threads = [
+            threading.Thread(target=self._pump, name="log-file", daemon=True),
+            threading.Thread(target=self._keep_synced, name="log-sync", daemon=True),
+        ]
+        for thread in self._threads:
+            thread.start()
 
     @property
     def inlet(self) -> str:
@@ -66,9 +74,11 @@ class LogFile:
 
     def finish(self, timeout_s: float) -> bool:
         """Wait until everything is on the disk and close the file; return whether that was done in time."""
-        self._thread.join(timeout_s)
-        if self._thread.is_alive():
-            return False
+        deadline_s = time.monotonic() + timeout_s
+        for thread in self._threads:
+            thread.join(max(0.0, deadline_s - time.monotonic()))
+            if thread.is_alive():
+                return False
         os.close(self._source)
         os.close(self._file)
         return True
@@ -83,19 +93,20 @@ class LogFile:
             pass
 
     def _pump(self) -> None:
-        while True:
-            if not select.select([self._source], [], [], self._until_sync_s())[0]:
-                self._try(self._sync)
-                continue
-            self._idle.clear()
-            chunk = os.read(self._source, PIPE_BYTES)
-            if not chunk:
-                break
+        while chunk := self._next():
             self._try(self._write, chunk)
             if not _waiting(self._source):
                 self._idle.set()
-                if time.monotonic() >= self._synced_s + self._sync_pause_s:
-                    self._try(self._sync)
+        self._ended.set()
+
+    def _next(self) -> bytes:
+        select.select([self._source], [], [])
+        self._idle.clear()  # before the pipe is emptied: whoever waits for both must not find both in between
+        return os.read(self._source, PIPE_BYTES)
+
+    def _keep_synced(self) -> None:
+        while not self._ended.wait(self._sync_pause_s):
+            self._try(self._sync)
         self._try(self._sync)
 
     def _try(self, step: Callable[..., None], *chunk: bytes) -> None:
@@ -107,31 +118,24 @@ class LogFile:
             self.fault = f"the log {self._path} cannot be written: {error.strerror}"
 
     def _write(self, chunk: bytes) -> None:
-        self._unsynced_s = self._unsynced_s or time.monotonic()
-        rest = memoryview(chunk)
+        begun_s, rest = time.monotonic(), memoryview(chunk)
         while rest:
             written = os.write(self._file, rest)
             self.bytes_written += written
             self.crc32 = zlib.crc32(rest[:written], self.crc32)
             rest = rest[written:]
-
-    def _until_sync_s(self) -> float | None:
-        """Return how long to wait for more before a sync; None: nothing has to be synced."""
-        if self._unsynced_s is None or self.fault:
-            return None
-        return max(0.0, self._unsynced_s + self._sync_pause_s - time.monotonic())
+            self._unsynced_s = self._unsynced_s or begun_s  # only now: a sync that has begun already may not cover it
 
     def _sync(self) -> None:
-        if self._unsynced_s is None:
+        since_s, self._unsynced_s = self._unsynced_s, None
+        if since_s is None:
             return
         try:
             os.fdatasync(self._file)
         except OSError as error:
             if error.errno != errno.EINVAL:  # a device or a pipe, which has nothing to sync
                 raise
-        self._synced_s = time.monotonic()
-        self.longest_sync_s = max(self.longest_sync_s, self._synced_s - self._unsynced_s)
-        self._unsynced_s = None
+        self.longest_sync_s = max(self.longest_sync_s, time.monotonic() - since_s)
 
 
 def _waiting(pipe: int) -> bool:

@@ -19,7 +19,7 @@ from runtime.log.segments import Segments
 from runtime.log.settings import LogSettings
 
 _CLOSE_TIMEOUT_S = 10.0
-_COLLECTING = 0.75  # of the flush interval; the rest is for encoding and writing
+_COLLECTING = 0.4  # of the flush interval; the rest is for encoding and writing, also where the processor is busy
 _POLL_S = 0.001
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from runtime.cycle import Cycle
 from runtime.keyframes import KeyFrame
+from runtime.log.finishing import Finishing
 from runtime.log.header import RunHeader
 from runtime.log.layout import layout
 from runtime.log.live import LiveView
@@ -49,13 +50,15 @@ class Segments:
         self._recording_id = str(uuid.uuid4())
         self._files: list[_File] = []
         self._longest_sync_s = 0.0
+        self._fault = ""
+        self._finishing: Finishing | None = None  # the file before the present one
         self.stops = Stops()
         self._writer = self._begin(path)
 
     @property
     def fault(self) -> str:
         """Why the log can no longer be written; empty while it can."""
-        return self._writer.fault
+        return self._fault or (self._finishing.fault if self._finishing is not None else "") or self._writer.fault
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -101,6 +104,7 @@ class Segments:
 
     def close(self, timeout_s: float, *, complete: bool) -> None:
         """Finish the last file; only a log that is `complete` gets the mark that says so."""
+        self._await_finished()
         self._writer.close(timeout_s, last=True if complete else None)
         if self._live is not None:
             self._live.close()
@@ -117,23 +121,35 @@ class Segments:
         return not self.fault and full >= (1.0 if key_frame is not None else _LARGEST)
 
     def _rotate(self, path: Path) -> None:
+        self._await_finished()
         self._writer.send()
-        file = self._files[-1]
-        self._writer.close(_CLOSE_TIMEOUT_S, last=False)
-        file.bytes, self._longest_sync_s = self._writer.bytes_written, self.longest_sync_s
+        self._writer.send_drawn()
+        self._writer.flush(self._settings.flush_interval_s)  # nothing newer may be in the next file before this is in its own
+        file, full = self._files[-1], self._writer
+        file.bytes = full.bytes_written
         if file.index == 0:
             file.path = path.rename(numbered(path, 0))
-        self._keep_budget()
+        surplus = self._surplus()
         self._writer = self._begin(numbered(path, file.index + 1))
+        self._finishing = Finishing(full, surplus, _CLOSE_TIMEOUT_S)
 
-    def _keep_budget(self) -> None:
-        """Delete the oldest files until there is room for another, but none around a stop."""
-        if self._settings.disk_budget_mb is None:
+    def _await_finished(self) -> None:
+        if self._finishing is None:
             return
+        self._files[-2].bytes, longest_sync_s = self._finishing.result()
+        self._longest_sync_s = max(self._longest_sync_s, longest_sync_s)
+        self._fault, self._finishing = self.fault, None
+
+    def _surplus(self) -> list[Path]:
+        """Return the oldest files, to be deleted until there is room for another one, but none around a stop."""
+        surplus: list[Path] = []
+        if self._settings.disk_budget_mb is None:
+            return surplus
         room = (self._settings.disk_budget_mb - self._settings.segment_mb) * _MB
         kept = [file for file in self._files if not file.deleted]
         excess = sum(file.bytes for file in kept) - room
         for file in kept:
             if excess > 0 and file.path is not None and not self.stops.any_near(file.first_ns, file.last_ns):
-                file.path.unlink(missing_ok=True)
+                surplus.append(file.path)
                 file.deleted, excess = True, excess - file.bytes
+        return surplus
