@@ -56,7 +56,10 @@ class EkfOdometry:
         """Fold in every sample at its own capture time, then carry the last twist on to the tick."""
         before, refused_before = self._history.newest, self._refused
         samples: tuple[Sample, ...] = (*sensed.imu, *(self._on_time(sample) for sample in sensed.base))
-        earliest_ns, latest_ns = sensed.tick.start_ns - self._late_max_ns, latest_valid_ns(sensed)
+        tick, latest_ns = sensed.tick, latest_valid_ns(sensed)
+        earliest_ns = tick.start_ns - tick.skipped * tick.period_ns - self._late_max_ns  # a late loop does not make a sample late
+        if before.time_ns is None:  # what was measured before the first tick is no fault of the device
+            samples = tuple(sample for sample in samples if sample.stamp.captured_ns >= earliest_ns)
         timely = [sample for sample in samples if earliest_ns <= sample.stamp.captured_ns <= latest_ns]
         first, repeated = self._history.insert(timely)
         self._refused += len(samples) - len(timely) + repeated
