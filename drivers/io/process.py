@@ -150,7 +150,7 @@ class IoProcess:
         spec, deadline_s = self._spec, time.monotonic() + self._spec.open_s
         while True:
             record, word = self._channels.health.read(), self._word
-            if record.state is DeviceState.OPEN:
+            if record.state in (DeviceState.OPEN, DeviceState.ENDED):  # a recording may be short
                 return
             late = time.monotonic() > deadline_s
             if word is not None or record.reconnects or record.state is DeviceState.FAULTED or late:
