@@ -61,6 +61,11 @@ class Limiter:
         x, y, w = self._axes
         return x.holds(twist.vx) and y.holds(twist.vy) and w.holds(twist.wz)
 
+    def nearest(self, twist: BodyTwist) -> BodyTwist:
+        """Return the twist inside the caps that is nearest to one which was measured: a skid-steer slips sideways too."""
+        x, y, w = (min(max(v, axis.lowest), axis.highest) for v, axis in zip(_values(twist), self._axes, strict=True))
+        return BodyTwist(x, y, w)
+
     def after(self, motion: Motion, sent: BodyTwist) -> Motion:
         """Return the motion after `sent` was sent."""
         before, dt = motion.twist, self._dt

@@ -85,7 +85,7 @@ class Supervisor:
     def _resume_from(self, belief: Belief, sensed: Sensed) -> None:
         """After the last command has expired the base stands or brakes by itself: go on from what it really does."""
         if self._limiter is not None and sensed.tick.start_ns >= self._last.expires_ns > 0:
-            self._motion = Motion(belief.twist if belief.twist.finite else BodyTwist())
+            self._motion = Motion(self._limiter.nearest(belief.twist) if belief.twist.finite else BodyTwist())
 
     def _reachable(self, response: Response) -> ReachableSet:
         if self._limiter is None:

@@ -1,6 +1,7 @@
 """What the limits admit: never empty, never beyond, and from every reachable motion there is a way on."""
 
 import math
+from dataclasses import replace
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -67,3 +68,10 @@ def test_a_base_that_cannot_strafe_or_reverse_is_never_allowed_to() -> None:
     reachable = Limiter(forward, DT).reachable(Motion())
     assert (reachable.lowest.vy, reachable.highest.vy) == (0.0, 0.0)
     assert reachable.lowest.vx == 0.0 < reachable.highest.vx
+
+
+def test_a_slip_that_was_measured_is_nothing_that_a_base_can_be_told() -> None:
+    limiter = Limiter(replace(LIMITS, velocity=BodyTwist(0.75, 0.0, 1.2), reverse=False), DT)
+    assert limiter.nearest(BodyTwist(0.8, -0.02, -1.3)) == BodyTwist(0.75, 0.0, -1.2)
+    assert limiter.nearest(BodyTwist(-0.1, 0.02, 0.3)) == BodyTwist(0.0, 0.0, 0.3)
+    assert limiter.within_caps(limiter.stopping(Motion(limiter.nearest(BodyTwist(0.8, -0.02, -1.3)))))
