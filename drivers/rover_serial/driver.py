@@ -33,7 +33,7 @@ class RoverBase:
         """
         self._settings, self._setup = settings, setup
         self._limits, self._kinematics = settings.limits, settings.nominal
-        self._channel = Channel(setup, settings.url, ("wheels", "pose"), settings.rate_hz)
+        self._channel = Channel(setup, settings.url, ("wheels", "pose"), settings.rate_hz, moves=True)
         self._channel.link.serve_base(setup.name, settings)
         self._covariance = np.diag([settings.position_std_m**2, settings.position_std_m**2, settings.yaw_std_rad**2])  # (3, 3)
 

@@ -20,7 +20,7 @@ class RoverImu:
 
     def __init__(self, settings: RoverImuSettings, setup: DeviceSetup) -> None:
         """Join the wire; nothing is touched."""
-        self._channel = Channel(setup, settings.url, ("imu",), settings.rate_hz)
+        self._channel = Channel(setup, settings.url, ("imu",), settings.rate_hz, moves=False)
         self._channel.link.serve_imu(setup.name, settings)
 
     def open(self) -> None:

@@ -93,8 +93,9 @@ class RoverLink:
 class Channel:
     """What base and unit have in common: rings of the shared link, and what is told of them."""
 
-    def __init__(self, setup: DeviceSetup, url: str, rings: tuple[str, ...], rate_hz: float) -> None:
+    def __init__(self, setup: DeviceSetup, url: str, rings: tuple[str, ...], rate_hz: float, *, moves: bool) -> None:
         """Join the link of this URL; nothing is touched."""
+        self._moves = moves
         self._setup = setup
         self._lease = setup.links.get(f"mavlink {url}", RoverLink)
         self._names = rings
@@ -158,7 +159,7 @@ class Channel:
             received=sum(ring.written for ring in rings),
             dropped=record.dropped,
             overflowed=sum(ring.overflowed for ring in rings),
-            expired_commands=record.expired_commands,
+            expired_commands=record.expired_commands if self._moves else 0,
             expected_period_ns=self._period_ns,
             battery_fraction=_known(record.battery_fraction),
             battery_v=_known(record.battery_v),
