@@ -1,0 +1,1 @@
+"""Clearance-manifold navigation (Cui, Deng, Wang)."""

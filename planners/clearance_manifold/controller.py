@@ -1,0 +1,83 @@
+"""Layer 3: the manifold dynamical system (equation 4), its longitudinal law, and the twist for either kind of base."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.interface.commands import BaseLimits, BodyTwist
+from drivers.interface.geometry import SE2, wrap_angle
+from estimators.belief import F64
+from planners.clearance_manifold.control_kernels import brakable, longitudinal
+from planners.clearance_manifold.settings import ControllerSettings
+from planners.point_ds.kernels import within
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """What the controller reads of the manifold: 1-D quantities at the robot (proposition 3)."""
+
+    error: F64  # (2,), e_perp, in odom [m]
+    tangent: F64  # (2,), unit
+    ridge_clearance_m: float  # rho_ridge, near the robot
+    margin_m: float  # M_min: least predicted clearance beyond rho_min ahead
+    commitment: float  # a_pred
+    free_m: float  # how far ahead it may go at most
+    heading_rad: float  # where the robot should look, in odom
+    feasible: bool
+
+
+class ManifoldController:
+    """Turns a situation into a body twist."""
+
+    def __init__(self, settings: ControllerSettings, limits: BaseLimits) -> None:
+        """Take the gains and the limits."""
+        self._settings, self._limits = settings, limits
+
+    def speed(self, at: Situation) -> float:
+        """Return k_parallel: cruise by clearance and margin, plus commitment, below what can be braked."""
+        s = self._settings
+        room = min(at.ridge_clearance_m / s.cruise_clearance_m, 1.0)
+        margin = min(max((at.margin_m - s.margin_low_m) / (s.margin_high_m - s.margin_low_m), 0.0), 1.0)
+        cruise = s.speed_m_s * max(room, 0.0) * margin
+        wanted = min(max(cruise + at.commitment * s.commitment_m_s, 0.0), s.speed_m_s)
+        return float(min(wanted, brakable(at.free_m, s.deceleration_m_s2, s.delay_s)))
+
+    def command(self, at: Situation, yaw: float) -> tuple[BodyTwist, float]:
+        """Return the twist and the speed along the manifold."""
+        s, cap = self._settings, self._limits.velocity
+        body = SE2(0.0, 0.0, -yaw)
+        push = body.apply(-s.lateral_gain_per_s * at.error)
+        tangent = body.apply(at.tangent)
+        speed = self.speed(at)
+        if at.feasible and speed + float(push @ tangent) < s.progress_m_s:
+            speed = min(s.progress_m_s, brakable(at.free_m, s.deceleration_m_s2, s.delay_s))
+        if not self._limits.holonomic:
+            return self._look_ahead_twist(push + speed * tangent), speed
+        cap_y = cap.vy
+        low_x = -cap.vx if self._limits.reverse else 0.0
+        push_x, push_y = within(float(push[0]), float(push[1]), low_x if low_x < 0.0 else -1e-9, cap.vx, cap_y)
+        k = longitudinal(push_x, push_y, float(tangent[0]), float(tangent[1]), speed, cap.vx, cap_y, low_x)
+        vx, vy = push_x + k * float(tangent[0]), push_y + k * float(tangent[1])
+        vx, vy = min(max(vx, low_x), cap.vx), min(max(vy, -cap_y), cap_y)
+        return BodyTwist(vx, vy, self.turn(at, yaw)), k
+
+    def turn(self, at: Situation, yaw: float) -> float:
+        """Return wz towards the heading wanted."""
+        cap = self._limits.velocity.wz
+        return min(max(self._settings.heading_gain_per_s * wrap_angle(at.heading_rad - yaw), -cap), cap)
+
+    def _look_ahead_twist(self, u: F64) -> BodyTwist:
+        """Return the twist that moves the point `look_ahead_m` ahead with velocity u, shape (2,), in the body frame.
+
+        Feedback linearisation: v = u_x, w = u_y / d.  What points backwards is turned to on the spot.
+        """
+        cap, d = self._limits.velocity, self._settings.look_ahead_m
+        if u[0] <= 0.0:
+            bearing = math.atan2(float(u[1]), float(u[0])) if float(np.hypot(*u)) > 1e-9 else 0.0
+            wz = self._settings.heading_gain_per_s * bearing
+            return BodyTwist(0.0, 0.0, min(max(wz, -cap.wz), cap.wz))
+        vx, wz_d = within(float(u[0]), float(u[1]), -cap.vx, cap.vx, cap.wz * d)
+        return BodyTwist(vx, 0.0, wz_d / d)

@@ -1,0 +1,130 @@
+"""Layer 2: ridge and box per station, then the quadratic program; from scratch, or repaired around a prediction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimators.belief import F64
+from planners.clearance_manifold.manifold import Manifold, Stations, points_of
+from planners.clearance_manifold.offset_qp import FAR_M, OffsetProgram
+from planners.clearance_manifold.ridge_kernels import (
+    Demand,
+    Ground,
+    Sections,
+    along_manifold,
+    boxes,
+    follow_branch,
+    profiles,
+    repair_all,
+)  # fmt: skip
+from planners.clearance_manifold.settings import SolverSettings, TrackerSettings
+
+CURVATURE_LENGTH_M = 0.5  # at which curvature costs as much as slope
+CENTRING = 0.05
+TURN = 0.5
+LIKING = 0.3
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What a manifold is laid through at one tick."""
+
+    ground: Ground
+    sections: Sections
+    arcs_m: F64  # (n,), of the stations, on the chart
+    confidence: F64  # (n,), of the observation at the centre line
+    robot_m: float  # lateral offset of the robot
+
+
+@dataclass(frozen=True, slots=True)
+class Prior:
+    """The manifold of the frame before, at this frame's stations."""
+
+    offset_m: F64  # (n,)
+    duals: F64  # (n,)
+
+
+class Solver:
+    """The two-stage solver of section 4.2 and the repairing one of section 4.4."""
+
+    def __init__(
+        self, settings: SolverSettings, tracker: TrackerSettings, stations: Stations, radius_m: float, period_s: float
+    ) -> None:
+        """Set both programs up."""
+        s = settings
+        self._settings, self._tracker, self._stations = settings, tracker, stations
+        self.least_m = radius_m + s.margin_m
+        self._demand = Demand(self.least_m, max(s.ridge_enough_m, self.least_m), CENTRING)
+        self._offsets = np.linspace(-s.half_width_m, s.half_width_m, s.cross_samples)
+        self._spacing = np.diff(stations.arcs_m[stations.own :])
+        self._step_m = 2.0 * s.half_width_m / (s.cross_samples - 1)
+        temporal = tracker.weight_temporal * 0.2 / period_s
+        self._free = OffsetProgram(stations.arcs_m, (s.weight_data, s.weight_homotopy), s.weight_smooth, CURVATURE_LENGTH_M)
+        self._bound = OffsetProgram(
+            stations.arcs_m, (s.weight_data, s.weight_homotopy, temporal), s.weight_smooth, CURVATURE_LENGTH_M
+        )
+
+    def branch(self, scene: Scene, liked: F64 | None) -> tuple[F64, float, int]:
+        """Return the best branch ahead, shape (forward + 1,), its least clearance [m] and how many of its stations are wide enough."""
+        own = self._stations.own
+        ahead = Sections(*(part[own:] for part in scene.sections))
+        rho = profiles(scene.ground, ahead, self._offsets)
+        wanted = np.full(len(rho), np.nan) if liked is None else liked[own:]
+        y, clearance = follow_branch(rho, self._offsets, self._spacing, scene.robot_m, wanted, LIKING, self._demand, TURN)
+        wide = clearance >= self.least_m
+        return y, float(clearance.min()), int(len(wide) if wide.all() else np.argmin(wide))
+
+    def extract(self, scene: Scene, prior: Prior | None) -> Manifold:
+        """Return the manifold of the two-stage solver; with a prior, the branch followed so far is preferred."""
+        ahead, _, _ = self.branch(scene, None if prior is None else prior.offset_m)
+        own = self._stations.own
+        inside = np.concatenate((np.full(own, ahead[0] if prior is None else np.nan), ahead))
+        if prior is not None:
+            inside[:own] = prior.offset_m[:own]
+        found = boxes(scene.ground, scene.sections, inside, self._step_m, self._demand)
+        return self._solve(scene, self._free, found, inside, (inside,), inside, np.zeros(len(inside)))[0]
+
+    def repair(self, scene: Scene, prior: Prior, tubes_m: F64) -> tuple[Manifold, F64, int, bool]:
+        """Return the repaired manifold, its multipliers, how many stations from the own on could be repaired, and convergence."""
+        inside, repaired = repair_all(
+            scene.ground, scene.sections, prior.offset_m, tubes_m, self._stations.own, self._tracker.hysteresis, self._demand
+        )
+        own, n = self._stations.own, len(inside)
+        if 0 < repaired < n - own:  # regrow the suffix from the last valid station
+            liked = np.where(np.arange(n) < own + repaired, prior.offset_m, np.nan)
+            regrown, _, _ = self.branch(scene, liked)
+            inside[own + repaired :] = regrown[repaired:]
+        found = boxes(scene.ground, scene.sections, inside, self._step_m, self._demand)
+        near = np.where(np.isfinite(found[:, 2]), found[:, 2], prior.offset_m)
+        ridge = np.clip(near, prior.offset_m - tubes_m, prior.offset_m + tubes_m)
+        ridge[own + repaired :] = near[own + repaired :]
+        found[:, 2] = np.where(np.isfinite(found[:, 2]), ridge, np.nan)
+        references = (prior.offset_m, prior.offset_m)
+        manifold, duals, converged = self._solve(scene, self._bound, found, inside, references, prior.offset_m, prior.duals)
+        return manifold, duals, repaired, converged
+
+    def _solve(
+        self, scene: Scene, program: OffsetProgram, found: F64, inside: F64, references: tuple[F64, ...], start: F64, duals: F64
+    ) -> tuple[Manifold, F64, bool]:
+        own = self._stations.own
+        wide = np.isfinite(found[:, 2])
+        valid = int(len(wide) - own if wide[own:].all() else np.argmin(wide[own:]))
+        binds = wide & (np.arange(len(wide)) < own + valid)
+        binds[:own] &= scene.confidence[:own] >= self._settings.rear_confidence
+        low, high = np.where(binds, found[:, 0], -FAR_M), np.where(binds, found[:, 1], FAR_M)
+        ridge = _filled(np.where(binds, found[:, 2], np.nan), scene.robot_m)
+        anchors = tuple(np.where(binds, ref, ridge) for ref in references)
+        offset, duals, converged = program.solve((ridge, *anchors), low, high, np.where(np.isfinite(start), start, ridge), duals)
+        points = points_of(scene.sections, offset)
+        clearance = along_manifold(scene.ground, points)
+        return Manifold(scene.arcs_m, offset, points, low, high, ridge, clearance, valid, own), duals, converged
+
+
+def _filled(values: F64, otherwise: float) -> F64:
+    """Return the values, those missing as the nearest station that has one."""
+    good = np.flatnonzero(np.isfinite(values))
+    if not good.size:
+        return np.full_like(values, otherwise)
+    return np.asarray(np.interp(np.arange(len(values)), good, values[good]))

@@ -1,0 +1,99 @@
+"""Layer 1: the clearance that the robot will find where it gets to, when it gets there."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.interface.samples import frozen_array
+from estimators.belief import F32, Belief, ClearanceField, Lattice
+from estimators.clearance import distance_to
+from estimators.rolling import transfer
+from planners.clearance_manifold.prediction_kernels import Arrival, observe, occupied_on_arrival
+from planners.clearance_manifold.settings import PredictionSettings
+
+NEVER_S = 1e6  # age of what was never in view
+SECOND_NS = 1_000_000_000
+
+
+class ArrivalField:
+    """Predicts the field, and remembers when each cell was last in view (section 4.1)."""
+
+    def __init__(self, settings: PredictionSettings) -> None:
+        """Start with nothing seen."""
+        self._settings = settings
+        self._lattice: Lattice | None = None
+        self._age_s: F32 = np.zeros((0, 0), np.float32)
+        self._stamp_ns = 0
+
+    def warm_up(self) -> None:
+        """Compile the kernels, on read-only arrays as a belief's are."""
+        field, known = frozen_array(np.ones((3, 3), np.float32)), frozen_array(np.ones((3, 3), np.bool_))
+        age_s = np.zeros((3, 3), np.float32)
+        observe(age_s, known, np.zeros(2), 1.0, np.zeros(3), 1.0, 1.0, 0.0)
+        occupied_on_arrival(field, field, age_s, np.zeros(2), 1.0, np.zeros(2), self._arrival(0.0))
+
+    def update(self, belief: Belief) -> F32:
+        """Take in what is seen now and return Gamma_pred [m] on the belief's lattice, shape (rows, columns)."""
+        field, pose = belief.clearance, belief.odom_from_base
+        self._observe(belief)
+        corner = np.array([field.lattice.x_m, field.lattice.y_m])
+        free = occupied_on_arrival(
+            field.clearance_m, field.rate_m_s, self._age_s, corner, field.lattice.cell_m, np.array([pose.x, pose.y]),
+            self._arrival(belief.twist.speed_m_s),
+        )  # fmt: skip
+        predicted: F32 = distance_to(free == 0, field.lattice.cell_m)
+        return predicted
+
+    @property
+    def confidence(self) -> F32:
+        """How sure each cell's observation still is, 0 to 1, shape (rows, columns)."""
+        return np.asarray(np.exp(-self._age_s / np.float32(self._settings.confidence_decay_s)), np.float32)
+
+    @property
+    def age_s(self) -> F32:
+        """How long ago each cell was last in view [s], shape (rows, columns)."""
+        return self._age_s
+
+    def _arrival(self, speed_m_s: float) -> Arrival:
+        s = self._settings
+        expected = max(0.5 * (speed_m_s + s.nominal_speed_m_s), s.speed_floor_m_s)
+        return Arrival(expected, s.horizon_max_s, s.trust_decay_s, s.confidence_decay_s)
+
+    def _observe(self, belief: Belief) -> None:
+        field, pose = belief.clearance, belief.odom_from_base
+        elapsed_s = max(0.0, (belief.stamp_ns - self._stamp_ns) / SECOND_NS) if self._lattice is not None else 0.0
+        self._age_s = _carried(self._age_s, self._lattice, field)
+        self._lattice, self._stamp_ns = field.lattice, belief.stamp_ns
+        corner = np.array([field.lattice.x_m, field.lattice.y_m])
+        s = self._settings
+        observe(
+            self._age_s, field.known, corner, field.lattice.cell_m, np.array([pose.x, pose.y, pose.yaw]),
+            math.radians(0.5 * s.fov_deg), s.range_m, elapsed_s,
+        )  # fmt: skip
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """Return what is remembered, as named arrays."""
+        at = self._lattice
+        corner = np.zeros(0) if at is None else np.array([at.x_m, at.y_m, at.cell_m])
+        return {"age_corner": corner, "age_s": self._age_s, "age_stamp_ns": np.array([self._stamp_ns], np.int64)}
+
+    def take(self, state: dict[str, NDArray[Any]]) -> None:
+        """Take over what `state` gave."""
+        self._age_s = np.asarray(state["age_s"], np.float32)
+        corner = state["age_corner"].tolist()
+        self._lattice = Lattice(*corner, *self._age_s.shape) if corner else None
+        self._stamp_ns = int(state["age_stamp_ns"][0])
+
+
+def _carried(age_s: F32, before: Lattice | None, field: ClearanceField) -> F32:
+    """Return the ages on the field's lattice; a lattice of other cells begins anew."""
+    if before == field.lattice:
+        return age_s
+    shape = (field.lattice.rows, field.lattice.columns)
+    if before is None or before.cell_m != field.lattice.cell_m:
+        return np.full(shape, NEVER_S, np.float32)
+    return transfer(age_s, before, field.lattice, NEVER_S)

@@ -1,0 +1,111 @@
+"""Settings of the clearance-manifold planner: appendix B of the paper, and what it leaves open.
+
+Constants per step are converted from the paper's control period of 0.2 s; the README says which settings the paper gives.
+"""
+
+from pydantic import Field
+
+from drivers.interface.settings import Settings
+
+
+class PredictionSettings(Settings):
+    """Layer 1: the arrival-conditioned field (equation 2)."""
+
+    confidence_decay_s: float = Field(default=2.5, gt=0.0, le=60.0, description="tau_decay: of confidence in what is out of view")
+    trust_decay_s: float = Field(default=1.5, gt=0.0, le=60.0, description="tau_pred: of trust in a rate, over the horizon")
+    horizon_max_s: float = Field(default=2.0, gt=0.0, le=10.0, description="H_max: no arrival is predicted later than this")
+    nominal_speed_m_s: float = Field(
+        default=0.4, gt=0.0, le=5.0, description="v_robot,nom: the speed that arrivals are expected at"
+    )
+    speed_floor_m_s: float = Field(default=0.05, gt=0.0, le=1.0, description="v_exec,floor: the least speed they are expected at")
+    fov_deg: float = Field(default=120.0, gt=0.0, le=360.0, description="what the camera sees, for the confidence")
+    range_m: float = Field(default=2.5, gt=0.1, le=20.0, description="how far it sees")
+
+
+class ChartSettings(Settings):
+    """The corridor chart: the centre line that offsets are measured from."""
+
+    smoothing_m: float = Field(
+        default=0.8, ge=0.0, le=5.0, description="length over which the route is smoothed into a centre line"
+    )
+    escape_m: float = Field(default=0.8, gt=0.0, le=5.0, description="a route this far off the centre line asks for a new one")
+
+
+class SolverSettings(Settings):
+    """Layer 2: stations, cross-sections, ridge, box and quadratic program."""
+
+    stations_forward: int = Field(default=14, ge=4, le=100, description="stations ahead of the robot's own")
+    stations_rear: int = Field(default=6, ge=1, le=50, description="stations behind it")
+    horizon_m: float = Field(default=4.0, gt=0.5, le=20.0, description="L_horizon: how far ahead they reach")
+    rear_m: float = Field(default=1.2, gt=0.1, le=10.0, description="L_rear: how far behind")
+    cross_samples: int = Field(default=31, ge=5, le=201, description="M_cross: samples of a cross-section")
+    half_width_m: float = Field(default=1.0, gt=0.1, le=5.0, description="half of a cross-section")
+    margin_m: float = Field(default=0.08, ge=0.0, le=1.0, description="rho_min beyond the robot's radius: 0.20 m - 0.12 m")
+    skip_s: float = Field(
+        default=0.6, ge=0.0, le=10.0, description="N_skip = 3 steps: between two looks at the whole cross-section"
+    )
+    weight_data: float = Field(default=0.1, gt=0.0, le=100.0, description="w_1: cost of leaving the ridge")
+    weight_smooth: float = Field(default=0.5, ge=0.0, le=100.0, description="w_smooth: cost of slope and curvature")
+    weight_homotopy: float = Field(
+        default=0.2, ge=0.0, le=100.0, description="w_homotopy: cost of leaving the branch followed so far"
+    )
+    ridge_enough_m: float = Field(default=0.6, gt=0.05, le=5.0, description="clearance beyond which more makes no better ridge")
+    rear_confidence: float = Field(default=0.3, ge=0.0, le=1.0, description="least confidence of a rear station whose box counts")
+
+
+class TrackerSettings(Settings):
+    """Section 4.4: continuation, its tube and what ends it."""
+
+    enabled: bool = Field(default=True, description="off: extracted anew every time (the paper's ablation 'no continuation')")
+    weight_temporal: float = Field(default=0.2, ge=0.0, le=100.0, description="cost of leaving the manifold of the frame before")
+    lipschitz_m_s: float = Field(default=0.5, gt=0.0, le=10.0, description="L of P4: how fast a manifold may move")
+    tube_m: float = Field(default=0.10, gt=0.0, le=2.0, description="least radius of the tube that a station is searched in")
+    hysteresis: float = Field(
+        default=0.3, ge=0.0, le=10.0, description="clearance that a metre off the predicted offset must gain"
+    )
+    switch_gain_m: float = Field(
+        default=0.10, ge=0.0, le=2.0, description="least clearance gained by another branch worth the switch"
+    )
+    repaired_share: float = Field(
+        default=0.3, ge=0.0, le=1.0, description="of the forward stations; fewer repaired: the tube collapsed"
+    )
+    step_share: float = Field(default=1.5, gt=0.0, le=10.0, description="dynamic-step fallback, in forward station spacings")
+    lateral_m: float = Field(default=0.40, gt=0.0, le=5.0, description="lateral fallback")
+    tangent_cosine: float = Field(default=0.30, ge=-1.0, le=1.0, description="tangent fallback")
+    pose_jump_m: float = Field(default=0.50, gt=0.0, le=5.0, description="pose-jump fallback")
+    goal_jump_m: float = Field(default=1.0, gt=0.0, le=20.0, description="goal-jump fallback")
+
+
+class ControllerSettings(Settings):
+    """Layer 3: the manifold dynamical system and its longitudinal law."""
+
+    lateral_gain_per_s: float = Field(default=4.0, gt=0.0, le=50.0, description="k_perp")
+    speed_m_s: float = Field(default=0.5, gt=0.0, le=5.0, description="v_max")
+    commitment_m_s: float = Field(
+        default=0.2, ge=0.0, le=2.0, description="Phi_0: speed added for full commitment to the prediction"
+    )
+    cruise_clearance_m: float = Field(default=0.4, gt=0.0, le=5.0, description="s_rho,ref: clearance that full speed asks for")
+    margin_low_m: float = Field(default=0.0, ge=-1.0, le=1.0, description="s_low: margin over rho_min that gives no speed")
+    margin_high_m: float = Field(default=0.15, gt=0.0, le=2.0, description="s_high: margin that gives full speed")
+    deceleration_m_s2: float = Field(default=0.5, gt=0.0, le=10.0, description="a_decel of the braking law")
+    delay_s: float = Field(default=0.05, ge=0.0, le=2.0, description="dt_delay: driven on before the brake takes hold")
+    heading_gain_per_s: float = Field(default=2.0, ge=0.0, le=20.0, description="k_heading")
+    heading_look_ahead_m: float = Field(
+        default=1.0, gt=0.0, le=10.0, description="the heading is that of the manifold up to here"
+    )
+    progress_m_s: float = Field(default=0.10, ge=0.0, le=1.0, description="v_min,progress: anti-freeze floor along the manifold")
+    body_m: float = Field(default=0.25, ge=0.0, le=2.0, description="kept from the unknown; nearer cells are stood on already")
+    arrival_m: float = Field(default=0.05, gt=0.0, le=1.0, description="this near the goal it stands")
+    look_ahead_m: float = Field(
+        default=0.2, gt=0.01, le=2.0, description="of a base that cannot strafe: the point that is controlled"
+    )
+
+
+class ClearanceManifoldSettings(Settings):
+    """The three layers."""
+
+    prediction: PredictionSettings = PredictionSettings()
+    chart: ChartSettings = ChartSettings()
+    solver: SolverSettings = SolverSettings()
+    tracker: TrackerSettings = TrackerSettings()
+    controller: ControllerSettings = ControllerSettings()

@@ -1,0 +1,185 @@
+"""Continuation: translate, repair, optimise, validate, or fall back to extraction (section 4.4)."""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.interface.geometry import SE2
+from estimators.belief import F64, Belief
+from planners.clearance_manifold.chart import Chart
+from planners.clearance_manifold.extraction import Prior, Scene, Solver
+from planners.clearance_manifold.manifold import Manifold, Stations, points_of
+from planners.clearance_manifold.ridge_kernels import along_manifold
+from planners.clearance_manifold.settings import SolverSettings, TrackerSettings
+
+SECOND_NS = 1_000_000_000
+
+
+class Category(enum.Enum):
+    """`fallback_category` of the paper's diagnostic, and the first frame, which continues nothing."""
+
+    COLD_START = "cold_start"
+    NONE = "none"
+    TASK_RESET = "task_reset"
+    SENSING_FAILURE = "sensing_failure"
+    REGULAR = "regular_continuation_failure"
+
+
+@dataclass(frozen=True, slots=True)
+class Continuation:
+    """The manifold of a tick, and how it came about."""
+
+    manifold: Manifold
+    category: Category
+    trigger: str  # what ended the continuation, in a word or two
+    deviation_m: float  # M2: largest distance between the two manifolds at the same station; 0 without one before
+    normal_speed_m_s: float  # v_gamma of definition 1
+    same_branch: bool  # P3
+    converged: bool
+
+
+class Tracker:
+    """Carries the manifold from frame to frame."""
+
+    def __init__(
+        self, settings: TrackerSettings, solver_settings: SolverSettings, solver: Solver, stations: Stations, period_s: float
+    ) -> None:
+        """Start with no manifold."""
+        self._settings, self._solver_settings, self._solver, self._stations = settings, solver_settings, solver, stations
+        self._period_s = period_s
+        self._step_limit_m = settings.step_share * solver_settings.horizon_m / solver_settings.stations_forward
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the manifold."""
+        self._points: F64 = np.zeros((0, 2))
+        self._arcs_m: F64 = np.zeros(0)
+        self._offset_m: F64 = np.zeros(0)
+        self._duals: F64 = np.zeros(len(self._stations.arcs_m))
+        self._robot = SE2()
+        self._lateral_m = 0.0
+        self._stamp_ns = 0
+        self._looked_ns = 0
+
+    @property
+    def holds(self) -> bool:
+        """Whether there is a manifold to continue."""
+        return len(self._arcs_m) > 0
+
+    def rechart(self, chart: Chart) -> None:
+        """Express the manifold on another chart."""
+        if not self.holds:
+            return
+        on_chart = chart.project(self._points)
+        order = np.argsort(on_chart[:, 0], kind="stable")
+        self._arcs_m, self._offset_m = on_chart[order, 0], on_chart[order, 1]
+
+    def advance(self, scene: Scene, belief: Belief, new_goal: bool) -> Continuation:
+        """Return this tick's manifold and keep it."""
+        elapsed_s = (belief.stamp_ns - self._stamp_ns) / SECOND_NS if self.holds else 0.0
+        prior = Prior(np.interp(scene.arcs_m, self._arcs_m, self._offset_m), self._duals) if self.holds else None
+        category, trigger = self._broken(scene, belief, new_goal, prior)
+        duals, converged = np.zeros(len(scene.arcs_m)), True
+        manifold = None
+        if prior is not None and category is Category.NONE:
+            manifold, duals, converged, trigger = self._continue(scene, prior, max(elapsed_s, self._period_s), belief.stamp_ns)
+            category = Category.NONE if manifold is not None else Category.REGULAR
+        if manifold is None:
+            keep = prior if category is Category.REGULAR else None
+            manifold = self._solver.extract(scene, keep)
+            duals = np.zeros(len(scene.arcs_m))
+            self._looked_ns = belief.stamp_ns
+        told = self._compare(scene, manifold, prior, elapsed_s)
+        self._keep(scene, manifold, duals, belief)
+        return Continuation(manifold, category, trigger, *told, converged)
+
+    def _broken(self, scene: Scene, belief: Belief, new_goal: bool, prior: Prior | None) -> tuple[Category, str]:
+        """Return what forbids to continue before it is tried."""
+        s, own = self._settings, self._stations.own
+        if prior is None:
+            return Category.COLD_START, "no manifold yet"
+        if new_goal:
+            return Category.TASK_RESET, "goal changed"
+        if belief.odom_from_base.distance(self._robot) > s.pose_jump_m:
+            return Category.SENSING_FAILURE, "pose jump"
+        moved = abs((scene.robot_m - prior.offset_m[own]) - self._lateral_m)
+        if moved > s.lateral_m:
+            return Category.SENSING_FAILURE, "lateral drift"
+        if not s.enabled:
+            return Category.REGULAR, "continuation is off"
+        if scene.confidence[own + 1 : own + 4].max() < self._solver_settings.rear_confidence:
+            return Category.REGULAR, "out of view"
+        return Category.NONE, ""
+
+    def _continue(self, scene: Scene, prior: Prior, elapsed_s: float, stamp_ns: int) -> tuple[Manifold | None, F64, bool, str]:
+        """Repair and optimise, then validate; no manifold where that fails, with the reason."""
+        s, own = self._settings, self._stations.own
+        tube_m = s.tube_m + s.lipschitz_m_s * elapsed_s
+        tubes_m = np.full(len(scene.arcs_m), tube_m)
+        manifold, duals, repaired, converged = self._solver.repair(scene, prior, tubes_m)
+        if repaired <= s.repaired_share * self._solver_settings.stations_forward:
+            return None, duals, converged, "tube collapsed"
+        moved = np.abs(manifold.offset_m - prior.offset_m)[own : own + repaired]
+        if moved.max() > self._step_limit_m:
+            return None, duals, converged, "overshoot"
+        before = points_of(scene.sections, prior.offset_m)
+        along, was = np.diff(manifold.points[own : own + repaired + 1], axis=0), np.diff(before[own : own + repaired + 1], axis=0)
+        lengths = np.hypot(*along.T) * np.hypot(*was.T)
+        if ((along * was).sum(axis=1) < s.tangent_cosine * lengths).any():
+            return None, duals, converged, "tangents disagree"
+        if stamp_ns - self._looked_ns >= round(self._solver_settings.skip_s * SECOND_NS):
+            self._looked_ns = stamp_ns
+            _, clearance, wide = self._solver.branch(scene, prior.offset_m)
+            stuck = manifold.valid < wide
+            least = float(manifold.clearance_m[manifold.ahead].min())
+            if stuck or (
+                manifold.valid == wide and clearance > least + s.switch_gain_m and least < self._solver.least_m + s.switch_gain_m
+            ):
+                return None, duals, converged, "better branch"
+        return manifold, duals, converged, ""
+
+    def _compare(self, scene: Scene, manifold: Manifold, prior: Prior | None, elapsed_s: float) -> tuple[float, float, bool]:
+        if prior is None or not manifold.valid:
+            return 0.0, 0.0, True
+        apart = manifold.offset_m[manifold.ahead] - prior.offset_m[manifold.ahead]
+        deviation = float(np.abs(apart).max())
+        middle = points_of(scene.sections, 0.5 * (manifold.offset_m + prior.offset_m))[manifold.ahead]
+        same = bool((along_manifold(scene.ground, middle) > 0.0).all())
+        return deviation, deviation / elapsed_s if elapsed_s > 0.0 else 0.0, same
+
+    def _keep(self, scene: Scene, manifold: Manifold, duals: F64, belief: Belief) -> None:
+        self._points, self._arcs_m, self._offset_m, self._duals = manifold.points, manifold.arcs_m, manifold.offset_m, duals
+        self._robot, self._stamp_ns = belief.odom_from_base, belief.stamp_ns
+        self._lateral_m = float(scene.robot_m - manifold.offset_m[self._stations.own])
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """Return what is carried on, as named arrays."""
+        robot = self._robot
+        return {
+            "points": self._points,
+            "arcs_m": self._arcs_m,
+            "offset_m": self._offset_m,
+            "duals": self._duals,
+            "robot": np.array([robot.x, robot.y, robot.yaw, self._lateral_m]),
+            "stamps_ns": np.array([self._stamp_ns, self._looked_ns], np.int64),
+        }
+
+    def take(self, state: dict[str, NDArray[Any]]) -> None:
+        """Take over what `state` gave."""
+        self._points, self._arcs_m = state["points"], state["arcs_m"]
+        self._offset_m, self._duals = state["offset_m"], state["duals"]
+        x, y, yaw, self._lateral_m = state["robot"].tolist()
+        self._robot = SE2(x, y, yaw)
+        self._stamp_ns, self._looked_ns = (int(stamp) for stamp in state["stamps_ns"])
+
+
+def heading(points: F64) -> float:
+    """Return the direction from the first to the last of points, shape (n, 2) [rad]."""
+    dx, dy = points[-1] - points[0]
+    return math.atan2(dy, dx)
