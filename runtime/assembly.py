@@ -68,6 +68,7 @@ def assemble(configuration: Configuration, seed: int) -> Assembly:
     Raises:
         ConfigurationError: parts that do not fit together; the sentence says which.
     """
+    _check_watchdogs(configuration)
     scene = draw_scene(configuration, seed)
     world = _world(configuration, scene)
     clocks: list[Clock] = []
@@ -147,6 +148,18 @@ def _check_period(configuration: Configuration, world: MujocoWorld) -> None:
             f"{configuration.source}: loop.rate_hz {configuration.loop.rate_hz:g} makes a period of {period_ns / 1e6:g} ms, "
             f"which is not a whole multiple of the physics step of {world.step_ns / 1e6:g} ms"
         )
+
+
+def _check_watchdogs(configuration: Configuration) -> None:
+    """Refuse a device whose own watchdog (a setting of its driver, `watchdog_s`) would act before a command has expired."""
+    lifetime_s = configuration.supervisor.command_lifetime_s
+    for name, choice in configuration.devices:
+        watchdog_s = getattr(choice.settings, "watchdog_s", None)
+        if watchdog_s is not None and watchdog_s <= lifetime_s:
+            raise ConfigurationError(
+                f"{configuration.source}: robot.{name}.watchdog_s of {watchdog_s:g} s is no longer than a command lives "
+                f"(supervisor.command_lifetime_s, {lifetime_s:g} s): it would coast before it is told to brake"
+            )
 
 
 def _mission(configuration: Configuration, scene: Scene | None) -> Mission:

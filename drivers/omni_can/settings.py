@@ -50,7 +50,7 @@ class OmniCanSettings(Settings):
     signs: tuple[Sign, Sign, Sign] = Field(default=(1, 1, 1), description="-1: the motor turns the other way round")
     gear_ratio: float = Field(default=1.0, gt=0.01, le=200.0, description="turns of the motor for one of the wheel")
     input_mode: Literal["passthrough", "vel_ramp"] = Field(default="passthrough", description="how an axis takes its set point")
-    watchdog_s: float = Field(default=0.2, gt=0.02, le=2.0, description="watchdog_timeout of every axis")
+    watchdog_s: float = Field(default=0.4, gt=0.02, le=2.0, description="watchdog_timeout of every axis; outlives a command")
     verify_watchdog: bool = Field(default=True, description="let every watchdog trip once, at rest, when the base is opened")
     encoder_ms: int = Field(default=10, ge=1, le=100, description="encoder_rate_ms of every axis")
     heartbeat_ms: int = Field(default=100, ge=10, le=1000, description="heartbeat_rate_ms")

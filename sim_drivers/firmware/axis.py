@@ -26,7 +26,7 @@ OVERSPEED = 1.2  # of the velocity limit; ODrive's vel_limit_tolerance
 class AxisSettings(Settings):
     """How an axis was configured over USB before it came on the bus."""
 
-    watchdog_s: float | None = Field(default=0.2, gt=0.0, le=10.0, description="watchdog_timeout; none: it is not enabled")
+    watchdog_s: float | None = Field(default=0.4, gt=0.0, le=10.0, description="watchdog_timeout; none: it is not enabled")
     watchdog_in_idle: bool = Field(default=True, description="it also runs, and sets its error, while the axis is idle")
     velocity_limit_turns_s: float = Field(default=5.0, gt=0.0, le=100.0, description="vel_limit")
     ramp_turns_s2: float = Field(default=10.0, gt=0.0, le=1000.0, description="vel_ramp_rate, in input mode VEL_RAMP")

@@ -6,6 +6,7 @@ import pytest
 
 from drivers.interface.errors import ConfigurationError
 from runtime import configuration
+from runtime.assembly import assemble
 from runtime.cli import run_command
 from runtime.emulate import CATCH_UP_NS, FreeRun, build
 from sim_drivers.scenarios.square import Square, SquareSettings
@@ -120,3 +121,12 @@ def test_an_emulation_ends_after_its_duration(tmp_path, capsys):
     told = capsys.readouterr().out
     assert "truth (emulated_truth): UDP 127.0.0.1:47911" in told
     assert "ready: square" in told
+
+
+def test_a_watchdog_that_would_act_before_a_command_has_expired_is_refused(tmp_path):
+    path = tmp_path / "hasty.yaml"
+    base = "base: {driver: omni_can, watchdog_s: 0.2, bus: {interface: virtual}}"
+    path.write_text(f"robot: {{name: hasty, radius_m: 0.1, height_m: 0.3, {base}}}\nmission: {{goals: [], time_limit_s: 1}}\n")
+    with pytest.raises(ConfigurationError, match=r"hasty.yaml: robot.base.watchdog_s of 0.2 s is no longer than a command lives"):
+        assemble(configuration.load(str(path)), 0)
+    assemble(configuration.load(str(path), ("supervisor.command_lifetime_s=0.1",)), 0)
