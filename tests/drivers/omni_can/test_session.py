@@ -86,7 +86,7 @@ def test_a_watchdog_that_does_not_trip_is_a_fault_that_names_the_axis():
     driven.hear(CLOSED)
     driven.poll(50)
     driven.bus.take()
-    for _ in range(8):
+    for _ in range(10):
         driven.hear(None)
         driven.bus.put(NODES[0] << 5 | 1, TRIPPED)
         driven.poll(100)
