@@ -86,12 +86,12 @@ def test_a_watchdog_that_does_not_trip_is_a_fault_that_names_the_axis():
     driven.hear(CLOSED)
     driven.poll(50)
     driven.bus.take()
-    for _ in range(10):
+    for _ in range(9):
         driven.hear(None)
         driven.bus.put(NODES[0] << 5 | 1, TRIPPED)
         driven.poll(100)
     assert driven.health.state is DeviceState.FAULTED
-    assert driven.health.fault == "base: the watchdog of axis 2 (node 4) did not trip within 0.2 s; is it enabled?"
+    assert driven.health.fault == "base: the watchdog of axis 2 (node 4) did not trip within 0.4 s; is it enabled?"
     assert {data for identifier, data, _ in driven.bus.take() if identifier & 0x1F == 7} == {b"\x01" + bytes(7)}  # idle
 
 
