@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from drivers.interface.sensed import Sensed
 from runtime.cycle import Cycle
+from runtime.log import checksum, rvl
 from runtime.log.checksum import Cells, checksums
 from runtime.log.columns import ArrowColumn, Column, Kind
 from runtime.log.schema import Schema
@@ -28,6 +29,12 @@ class Batch(NamedTuple):
 CHECK = "/replay/check"
 _CONSUMED = get_type_hints(Sensed)
 _DECIDED = {name: hint for name, hint in get_type_hints(Cycle).items() if name not in {"sensed", "stage_ns"}}
+
+
+def warm_up() -> None:
+    """Compile what the columns are coded and summed up with, so that the first batch does not have to wait for it."""
+    rvl.warm_up()
+    checksum.warm_up()
 
 
 def consumed_schemas(images: bool = True) -> dict[str, Schema]:

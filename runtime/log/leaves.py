@@ -5,10 +5,9 @@ from __future__ import annotations
 import enum
 import math
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, make_dataclass
 from functools import cache
-from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -17,20 +16,20 @@ from numpy.typing import NDArray
 from drivers.interface.samples import frozen_array
 from planners.planner import Diagnostics
 from runtime.log.columns import Column
-from runtime.log.nodes import Put, Row
+from runtime.log.nodes import Columns, Put
 
 
 class Scalar:
     """An int, a float, a bool or a str: one cell."""
 
-    def __init__(self, column: Column, kind: type) -> None:
-        """Write to the column, read back as `kind`."""
-        self._name, self._kind = column.name, kind
+    def __init__(self, column: Column) -> None:
+        """Write to the column."""
+        self._name = column.name
         self.put: Put = column.values.append
 
-    def take(self, row: Row) -> Any:
-        """Return the next value."""
-        return self._kind(next(row[self._name]))
+    def take(self, columns: Columns, count: int) -> Sequence[Any]:
+        """Return the next values."""
+        return columns[self._name].take(count)
 
 
 class Enumeration:
@@ -44,9 +43,9 @@ class Enumeration:
         """Write the member's name."""
         self._append(value.name)
 
-    def take(self, row: Row) -> enum.Enum:
-        """Return the member."""
-        return self._kind[next(row[self._name])]
+    def take(self, columns: Columns, count: int) -> Sequence[enum.Enum]:
+        """Return the members."""
+        return [self._kind[name] for name in columns[self._name].take(count)]
 
 
 class Array:
@@ -62,11 +61,14 @@ class Array:
         self._shape.values.extend(value.shape)
         self._elements.values.extend(value.ravel().tolist())
 
-    def take(self, row: Row) -> NDArray[np.float64]:
-        """Return the array."""
-        shape = tuple(islice(row[self._shape.name], next(row[self._shape.name])))
-        elements = list(islice(row[self._elements.name], math.prod(shape)))
-        return frozen_array(np.array(elements, np.float64).reshape(shape))
+    def take(self, columns: Columns, count: int) -> Sequence[NDArray[np.float64]]:
+        """Return the arrays, read-only."""
+        shapes, elements = columns[self._shape.name], columns[self._elements.name]
+        taken = []
+        for _ in range(count):
+            shape = shapes.take(shapes.take(1)[0])
+            taken.append(frozen_array(elements.numbers(math.prod(shape)).reshape(shape)))
+        return taken
 
 
 class Image:
@@ -77,9 +79,9 @@ class Image:
         self._name = column.name
         self.put: Put = column.values.append if recorded else lambda image: None
 
-    def take(self, row: Row) -> NDArray[np.uint16]:
-        """Return the image, shape (height, width)."""
-        return frozen_array(np.asarray(next(row[self._name]), np.uint16))
+    def take(self, columns: Columns, count: int) -> Sequence[NDArray[np.uint16]]:
+        """Return the images, shape (height, width), read-only."""
+        return [frozen_array(np.asarray(image, np.uint16)) for image in columns[self._name].take(count)]
 
 
 class Digest:
@@ -97,9 +99,9 @@ class Digest:
             self._last, self._crc = value, zlib.crc32(np.ascontiguousarray(value).data)
         self._append(self._crc)
 
-    def take(self, row: Row) -> Any:
-        """Return the CRC in place of the array, which cannot be had back."""
-        return next(row[self._name])
+    def take(self, columns: Columns, count: int) -> Sequence[Any]:
+        """Return the CRCs in place of the arrays, which cannot be had back."""
+        return columns[self._name].take(count)
 
 
 class Said:
@@ -120,12 +122,19 @@ class Said:
                 self._columns[key] = self._new_column(*key)
             self._columns[key].values.append(part)
 
-    def take(self, row: Row) -> Diagnostics:
-        """Return diagnostics that say the same, in a class of the same name: theirs may not be installed here."""
+    def take(self, columns: Columns, count: int) -> Sequence[Diagnostics]:
+        """Return diagnostics that say the same, in a class of the same name: theirs may not be installed here.
+
+        All of them are of one class: taken one tick at a time, or they may mix.
+        """
         prefix = self._name.name.removesuffix("type")
-        told = {name.removeprefix(prefix): cells for name, cells in row.items() if name.startswith(prefix)}
-        kind = next(told.pop("type"))
-        values = {name.removesuffix(".text"): next(cells) for name, cells in told.items()}
+        told = {name.removeprefix(prefix): cells for name, cells in columns.items() if name.startswith(prefix)}
+        return [self._one({name: cells.take(1)[0] for name, cells in told.items()}) for _ in range(count)]
+
+    @staticmethod
+    def _one(told: dict[str, Any]) -> Diagnostics:
+        kind = told.pop("type")
+        values = {name.removesuffix(".text"): value for name, value in told.items()}
         return _class_of(kind, tuple(values))(**values)
 
 

@@ -1,18 +1,49 @@
 """How one kind of value is taken apart into columns (`put`) and put together again (`take`), without losing a bit.
 
-The idea is record shredding (Melnik et al., "Dremel", VLDB 2010), with explicit counts in place of repetition levels.
+The idea is record shredding (Melnik et al., "Dremel", VLDB 2010), with explicit counts in place of repetition levels.  Values
+are put together many at a time, column by column: as many as a batch of ticks holds at once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from itertools import islice
 from operator import attrgetter
 from typing import Any, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from runtime.log.columns import Column
 
-Row = Mapping[str, Iterator[Any]]  # the cells of one tick, by column name
 Put = Callable[[Any], None]
+
+
+class Cursor:
+    """The values of one column, read from the first to the last."""
+
+    def __init__(self, values: Sequence[Any] | NDArray[Any]) -> None:
+        """Begin with the first."""
+        self._values, self._at = values, 0
+
+    def take(self, count: int) -> list[Any]:
+        """Return the next values as Python's own.  Raises ValueError where there are not so many."""
+        part = self._next(count)
+        return part.tolist() if isinstance(part, np.ndarray) else list(part)
+
+    def numbers(self, count: int) -> NDArray[np.float64]:
+        """Return the next values as an array.  Raises ValueError where there are not so many."""
+        return np.asarray(self._next(count), np.float64)
+
+    def _next(self, count: int) -> Sequence[Any] | NDArray[Any]:
+        end = self._at + count
+        if not self._at <= end <= len(self._values):
+            raise ValueError("too few values")
+        part, self._at = self._values[self._at : end], end
+        return part
+
+
+Columns = Mapping[str, Cursor]  # by name
 
 
 class Node(Protocol):
@@ -23,8 +54,8 @@ class Node(Protocol):
         """What takes a value apart."""
         ...
 
-    def take(self, row: Row) -> Any:
-        """Return the next value.  Raises StopIteration when the row holds none."""
+    def take(self, columns: Columns, count: int) -> Sequence[Any]:
+        """Return the next values.  Raises ValueError or KeyError when the columns do not hold them."""
         ...
 
 
@@ -49,9 +80,11 @@ class Record:
         for put, part in zip(self._puts, self._get(value), strict=True):
             put(part)
 
-    def take(self, row: Row) -> Any:
-        """Return the dataclass."""
-        return self._kind(**{name: child.take(row) for name, child in self._children.items()})
+    def take(self, columns: Columns, count: int) -> Sequence[Any]:
+        """Return the dataclasses."""
+        if not self._children:
+            return [self._kind() for _ in range(count)]
+        return list(map(self._kind, *(child.take(columns, count) for child in self._children.values())))
 
 
 def _getter(paths: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
@@ -74,9 +107,11 @@ class Optional:
         if value is not None:
             self._put(value)
 
-    def take(self, row: Row) -> Any:
-        """Return the value or None."""
-        return self._child.take(row) if next(row[self._name]) else None
+    def take(self, columns: Columns, count: int) -> Sequence[Any]:
+        """Return values and None."""
+        present = columns[self._name].take(count)
+        some = iter(self._child.take(columns, sum(present)))
+        return [next(some) if there else None for there in present]
 
 
 class Repeated:
@@ -93,9 +128,11 @@ class Repeated:
         for element in value:
             self._put(element)
 
-    def take(self, row: Row) -> tuple[Any, ...]:
-        """Return the tuple."""
-        return tuple(self._child.take(row) for _ in range(next(row[self._name])))
+    def take(self, columns: Columns, count: int) -> Sequence[tuple[Any, ...]]:
+        """Return the tuples."""
+        lengths = columns[self._name].take(count)
+        elements = iter(self._child.take(columns, sum(lengths)))
+        return [tuple(islice(elements, length)) for length in lengths]
 
 
 class Group:
@@ -112,9 +149,10 @@ class Group:
         for element in value:
             self._put(element)
 
-    def take(self, row: Row) -> tuple[Any, ...]:
-        """Return the tuple."""
-        return tuple(self._child.take(row) for _ in range(self._size))
+    def take(self, columns: Columns, count: int) -> Sequence[tuple[Any, ...]]:
+        """Return the tuples."""
+        elements = iter(self._child.take(columns, self._size * count))
+        return list(zip(*[elements] * self._size, strict=True))
 
 
 class Choice:
@@ -130,6 +168,8 @@ class Choice:
         self._append(name)
         self._children[name].put(value)
 
-    def take(self, row: Row) -> Any:
-        """Return the value."""
-        return self._children[next(row[self._name])].take(row)
+    def take(self, columns: Columns, count: int) -> Sequence[Any]:
+        """Return the values."""
+        names = columns[self._name].take(count)
+        each = {name: iter(self._children[name].take(columns, names.count(name))) for name in dict.fromkeys(names)}
+        return [next(each[name]) for name in names]

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from runtime.cycle import Cycle
 from runtime.keyframes import KeyFrame
-from runtime.log import rvl
+from runtime.log.exact import warm_up
 from runtime.log.header import RunHeader
 from runtime.log.incidents import bundle
 from runtime.log.segments import Segments
@@ -97,7 +97,7 @@ class Recorder:
         """
         if self._thread is not None or (self._path is None and not self._live):
             return
-        rvl.warm_up()
+        warm_up()
         try:
             port = self._settings.live_port if self._live else None
             self._segments = Segments(self._path, self._settings, self._header, port)

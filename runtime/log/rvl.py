@@ -8,16 +8,26 @@ those of ROS's `compressedDepth` format, which the viewer reads as `application/
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.samples import frozen_array
+
 MEDIA_TYPE = "application/rvl"
 _HEADER = struct.Struct("<iffii")  # format, two quantisation parameters (unused: the depth is exact), width, height
 
+_HEADER_WORDS = _HEADER.size // 4
+_MOST_PIXELS = 1 << 24  # of an image, so that a damaged header does not ask for all memory
+_NOTHING = np.zeros(0, np.uint8)
+
+B8 = NDArray[np.bool_]
 U8 = NDArray[np.uint8]
 U16 = NDArray[np.uint16]
+U32 = NDArray[np.uint32]
+I64 = NDArray[np.int64]
 
 
 def warm_up() -> None:
@@ -40,15 +50,36 @@ def decode(code: U8) -> U16:
     Raises:
         ValueError: the bytes are no such image, or are cut.
     """
-    if len(code) < _HEADER.size:
-        raise ValueError("a depth image is cut off")
-    _, _, _, width, height = _HEADER.unpack(code[: _HEADER.size].tobytes())
-    if not (0 <= width <= 1 << 16 and 0 <= height <= 1 << 16):
-        raise ValueError("the header of a depth image is damaged")
-    image = np.zeros(width * height, np.uint16)
-    if not _decode(np.ascontiguousarray(code[_HEADER.size :]), image):
+    image = decode_all([code])[0]
+    if image is None:
         raise ValueError("a depth image is damaged")
-    return image.reshape(height, width)
+    return image
+
+
+def decode_all(codes: Sequence[U8]) -> list[U16 | None]:
+    """Return the images that `encode` was given, read-only; None for one whose bytes are damaged.
+
+    They are decoded in one go, without the interpreter: between many short kernels another thread would hold it each time.
+    """
+    sizes = [_size(code) for code in codes]
+    held = [height * width for height, width in (size or (0, 0) for size in sizes)]
+    ends, pixels, whole = np.cumsum(held, dtype=np.int64), np.zeros(sum(held), np.uint16), np.zeros(len(codes), np.bool_)
+    lengths = [len(code) if size else 0 for code, size in zip(codes, sizes, strict=True)]
+    together = np.concatenate([_NOTHING, *(code for code, size in zip(codes, sizes, strict=True) if size)]).view("<u4")
+    _decode_all(together, np.cumsum(lengths, dtype=np.int64) // 4, pixels, ends, whole)
+    images = np.split(frozen_array(pixels), ends[:-1]) if codes else []
+    return [
+        image.reshape(size) if size is not None and sound else None
+        for image, size, sound in zip(images, sizes, whole.tolist(), strict=True)
+    ]
+
+
+def _size(code: U8) -> tuple[int, int] | None:
+    """Return height and width of a coded image; None: its header is damaged, or it is cut."""
+    if len(code) < _HEADER.size or len(code) % 4:
+        return None
+    _, _, _, width, height = _HEADER.unpack(code[: _HEADER.size].tobytes())
+    return (height, width) if min(width, height) >= 0 and width * height <= _MOST_PIXELS else None
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -94,33 +125,47 @@ def _encode(pixels: U16, code: U8) -> int:
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _get(code: U8, group: int) -> tuple[int, int]:
-    """Return the number that begins at a four-bit group, and where the next begins; -1: the code is at its end."""
-    value, shift = 0, 0
-    while 2 * group + 1 < 4 * code.size and shift < 60:
-        word, place = group // 8, 7 - group % 8
-        byte = 4 * word + place // 2
-        if byte >= code.size:
-            break
-        bits = code[byte] >> (4 * (place % 2)) & 15
-        value |= int(bits & 7) << shift
-        group, shift = group + 1, shift + 3
-        if not bits & 8:
-            return value, group
-    return -1, group
+def _decode_all(words: U32, word_ends: I64, pixels: U16, pixel_ends: I64, whole: B8) -> None:
+    begins, first = 0, 0
+    for k in range(whole.size):
+        if word_ends[k] > begins:
+            whole[k] = _decode(words[begins + _HEADER_WORDS : word_ends[k]], pixels[first : pixel_ends[k]])
+        begins, first = word_ends[k], pixel_ends[k]
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _decode(code: U8, pixels: U16) -> bool:
-    i, group, last = 0, 0, 0
+def _get(words: U32, at: int, word: np.uint32, left: int) -> tuple[np.int64, int, np.uint32, int]:
+    """Read the number that begins in the `left` four-bit groups of a word, the next of which is on top, or in word `at`.
+
+    Returns it, or -1 at the end of the words, and where the next one begins.
+    """
+    value, shift = np.uint64(0), np.uint64(0)
+    while True:
+        if left == 0:
+            if at >= words.size:
+                return np.int64(-1), at, word, left
+            word, at, left = np.uint32(words[at]), at + 1, 8
+        group = word >> np.uint32(28)
+        word, left = np.uint32(word << np.uint32(4)), left - 1
+        value |= np.uint64(group & np.uint32(7)) << shift
+        if group < np.uint32(8):
+            return np.int64(value), at, word, left
+        shift += np.uint64(3)
+        if shift > np.uint64(57):
+            return np.int64(-1), at, word, left
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _decode(words: U32, pixels: U16) -> bool:
+    i, at, word, left, last = 0, 0, np.uint32(0), 0, 0
     while i < pixels.size:
-        zeros, group = _get(code, group)
-        others, group = _get(code, group)
+        zeros, at, word, left = _get(words, at, word, left)
+        others, at, word, left = _get(words, at, word, left)
         if zeros < 0 or others < 0 or zeros + others == 0 or i + zeros + others > pixels.size:
             return False
         i += zeros
         for _ in range(others):
-            delta, group = _get(code, group)
+            delta, at, word, left = _get(words, at, word, left)
             if delta < 0:
                 return False
             last += (delta >> 1) ^ -(delta & 1)

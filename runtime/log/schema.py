@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import enum
 import types
-from collections.abc import Iterator
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planners.planner import Diagnostics
 from runtime.log import leaves, nodes
@@ -38,17 +39,18 @@ class Schema:
         for column in self.columns.values():
             column.ends.append(len(column.values))
 
-    def take(self, cells: dict[str, Any]) -> Any:
-        """Return what one tick's cells, by column name, were made of.
+    def take(self, cells: Mapping[str, Sequence[Any] | NDArray[Any]], ticks: int = 1) -> Any:
+        """Return what one tick's cells, by column name, were made of; of several ticks, a list.
 
         Raises:
-            ValueError: cells are missing.
+            ValueError: cells are missing, or are none that `put` writes.
         """
-        row = _Row((name, iter(values)) for name, values in cells.items())
+        columns = _Columns((name, nodes.Cursor(values)) for name, values in cells.items())
         try:
-            return self._root.take(row)
-        except (StopIteration, RuntimeError) as error:  # RuntimeError: a StopIteration inside a generator
-            raise ValueError(f"the log holds too few values of {self.entity}") from error
+            taken = self._root.take(columns, ticks)
+        except (LookupError, TypeError, ValueError) as error:
+            raise ValueError(f"the log holds too few values of {self.entity}, or others than were written") from error
+        return taken[0] if ticks == 1 else taken
 
     def clear(self) -> None:
         """Start a new batch."""
@@ -65,7 +67,7 @@ class Schema:
 
     def _node(self, name: str, hint: Any) -> nodes.Node:
         if hint in _KINDS:
-            return leaves.Scalar(self._column(name, _KINDS[hint]), hint)
+            return leaves.Scalar(self._column(name, _KINDS[hint]))
         if get_origin(hint) in {types.UnionType, Union}:
             return self._union(name, get_args(hint))
         if get_origin(hint) is tuple:
@@ -112,12 +114,12 @@ class Schema:
         return column
 
 
-class _Row(dict[str, Iterator[Any]]):
-    """The cells of one tick; a column that has none is empty."""
+class _Columns(dict[str, nodes.Cursor]):
+    """Columns by name; one that is not there is empty."""
 
-    def __missing__(self, name: str) -> Iterator[Any]:
+    def __missing__(self, name: str) -> nodes.Cursor:
         """Return no values."""
-        return iter(())
+        return nodes.Cursor(())
 
 
 def _join(path: str, name: str) -> str:

@@ -13,17 +13,17 @@ from runtime.assembly import assemble_recorded
 from runtime.configuration import Configuration
 from runtime.cycle import Cycle
 from runtime.keyframes import KeyFrame
-from runtime.log import rvl
-from runtime.log.exact import CHECK
+from runtime.log.block import Row
+from runtime.log.exact import CHECK, warm_up
 from runtime.log.header import RunHeader, processor
 from runtime.log.keyframes import KEY_FRAME
 from runtime.log.origin import header_of
-from runtime.log.stream import Row, rows
+from runtime.log.stream import rows
 from runtime.log.times import starts_ns
 from runtime.loop import run_loop
 from runtime.parts import Parts
 from runtime.replay.changes import configuration_of
-from runtime.replay.comparison import Comparison, Difference
+from runtime.replay.comparison import Comparison
 from runtime.replay.recorded_belief import RecordedBeliefs
 from runtime.replay.report import ReplayReport
 from runtime.replay.robot import RecordedRobot
@@ -31,8 +31,6 @@ from runtime.replay.stretches import Stretches
 from runtime.stopwatch import Stopwatch
 
 ELSEWHERE = 1e-6  # tolerance on another processor: its last bits differ, and what they are multiplied by is not large
-
-
 _NAMED = ("estimator", "router", "planner", "shield")
 
 
@@ -77,12 +75,11 @@ class _Replay:
         self._tolerance = ELSEWHERE if options.tolerance is None and self._elsewhere else options.tolerance
         self._counterfactual = options.planner is not None or bool(options.overrides)
         self._comparison = Comparison(None if self._counterfactual else self._tolerance)
-        self._first: Difference | None = None
-        self._ticks = self._differing = 0
+        self._ticks = 0
         self._span_ns = (0, 0)
 
     def report(self) -> ReplayReport:
-        rvl.warm_up()
+        warm_up()
         stretches = Stretches(rows(self._log), self._beginning(), self._options.last)
         side_by_side = self._options.opened(self._header, self._configuration)
         began_s = time.perf_counter()
@@ -99,8 +96,8 @@ class _Replay:
             beginnings=tuple(starts),
             passed_over=stretches.passed_over,
             damaged=tuple(stretches.damaged),
-            differing_ticks=self._differing,
-            first_difference=self._first,
+            differing_ticks=self._comparison.differing_ticks,
+            first_difference=self._comparison.first,
             recorded_s=(self._span_ns[1] - self._span_ns[0]) * 1e-9,
             took_s=time.perf_counter() - began_s,
         )
@@ -140,6 +137,7 @@ class _Replay:
             run_loop(robot.ticks(again()), stages, Stopwatch(), lambda cycle: False)
         finally:
             parts.runner.close()
+        self._comparison.finish()
         return first.tick
 
     def _assembled(self) -> tuple[RecordedRobot, Parts]:
@@ -165,10 +163,7 @@ class _Replay:
         now_ns = cycle.sensed.tick.start_ns
         self._span_ns = (self._span_ns[0] if self._ticks else now_ns, now_ns)
         self._ticks += 1
-        difference = next(self._comparison.differences(cycle, row), None)
-        if difference is not None:
-            self._differing += 1
-            self._first = self._first or difference
+        self._comparison.put(cycle, row)
         if side_by_side is not None:
             side_by_side.put(row, cycle)
 

@@ -10,7 +10,7 @@ from drivers.interface.sensed import Sensed, Tick
 from planners.planner import Plan
 from runtime.fault_board import FaultBoard
 from runtime.faults import Fault, FaultReport
-from runtime.log.stream import Row
+from runtime.log.block import Row
 
 
 class RecordedRobot:

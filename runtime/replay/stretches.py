@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from runtime.log.stream import Row
+from runtime.log.block import Row
 
 
 class Stretches:
@@ -37,7 +37,7 @@ class Stretches:
             following = self._next()
             if following is None:
                 return
-            if following.lost_before or following.tick != row.tick + 1 + following.skipped or not self._is_sound(following):
+            if not self._is_sound(following) or following.lost_before or following.tick != row.tick + 1 + following.skipped:
                 self._held = following
                 return
             row = following

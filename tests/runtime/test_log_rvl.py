@@ -41,3 +41,15 @@ def test_noise_never_reads_beyond_the_image() -> None:
     for _ in range(200):
         with suppress(ValueError):
             assert rvl.decode(np.concatenate((head, random.integers(0, 256, 24).astype(np.uint8)))).shape == (4, 4)
+
+
+def test_one_damaged_image_leaves_the_others_whole() -> None:
+    images = [np.full((2, k), k, np.uint16) for k in range(1, 5)]
+    codes = [rvl.encode(image) for image in images]
+    codes[1] = codes[1][:-4]
+    codes[2] = codes[2][:7]
+    first, *damaged, last = rvl.decode_all(codes)
+    assert damaged == [None, None]
+    assert np.array_equal(first, images[0])
+    assert np.array_equal(last, images[3])
+    assert rvl.decode_all([]) == []
