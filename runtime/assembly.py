@@ -18,6 +18,7 @@ from runtime.pacer import Pacer
 from runtime.parts import Parts, build_parts
 from runtime.planning import Ready, as_it_stands, awaited
 from runtime.robot import Devices, Robot
+from sim_drivers.faulty import FaultyDevice
 from sim_drivers.scene import Scene
 from sim_drivers.world import MujocoWorld
 
@@ -123,9 +124,16 @@ def _world(configuration: Configuration, scene: Scene | None) -> MujocoWorld | N
 
 def _devices(configuration: Configuration, seed: int, world: MujocoWorld | None, now_ns: Callable[[], int]) -> Devices:
     built: dict[str, Any] = {}
-    links = Links()
+    links, script = Links(), configuration.robot.faults
     for name, choice in configuration.devices:
-        built[name] = choice.build(DeviceSetup(name, seed, now_ns, world, links))
+        setup = DeviceSetup(name, seed, now_ns, world, links)
+        built[name] = choice.build(setup)
+        if own := tuple(fault for fault in script if fault.device == name):
+            built[name] = FaultyDevice(built[name], own, setup)
+    if strange := [fault.device for fault in script if fault.device not in built]:
+        raise ConfigurationError(
+            f"{configuration.source}: robot.faults: the robot has no device '{strange[0]}'. Known: {', '.join(built)}"
+        )
     return Devices(**built)
 
 

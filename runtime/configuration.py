@@ -19,6 +19,7 @@ from runtime import registry, yaml_files
 from runtime.log.settings import LogSettings
 from runtime.registry import Part
 from runtime.sections import LoopSection, MissionSection, SupervisorSection
+from sim_drivers.faulty import DeviceFault
 from sim_drivers.world import WorldSettings
 
 S = TypeVar("S", bound=Settings)
@@ -64,6 +65,7 @@ class RobotCommon(Settings):
     name: str = Field(min_length=1)
     radius_m: float = Field(gt=0.0, le=2.0, description="radius of the circle around the footprint")
     height_m: float = Field(gt=0.0, le=3.0)
+    faults: tuple[DeviceFault, ...] = Field(default=(), description="misbehaviour of its devices, by script")
 
 
 class PlannerCommon(Settings):
