@@ -10,10 +10,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.belief import F64, OCCUPIED, U8, Lattice, Mask
+from drivers.interface.samples import frozen_array
+from estimators.belief import F64, OCCUPIED, U8, Lattice, Mask, OccupancyGrid
 from estimators.labelling import FrameLabels
 from estimators.remembered import Remembered
 from estimators.rolling import transfer
+from estimators.traces import Traces
 from estimators.tracking_kernels import apparent_disc, centre_of
 
 STATIC_SHARE = 0.5  # of a connected surface; from here on the rest is taken for a part of the same wall
@@ -35,13 +37,15 @@ class Segment:
 
     points: F64  # (n, 2), centres of its cells in odom
     disc: Disc  # what it looks like, by its width
-    loose: bool  # whether most of it stands on open ground, and no wall hangs together with it
+    loose: bool  # whether most of it is sure to be no wall
 
 
 def warm_up() -> None:
     """Compile every kernel."""
     apparent_disc(np.ones((1, 2)), 0.0, 0.0)
     centre_of(np.ones((1, 2)), 0.0, 0.0, 1.0)
+    nothing = OccupancyGrid(Lattice(0.0, 0.0, 1.0, 8, 8), frozen_array(np.zeros((8, 8), dtype=np.uint8)))
+    Traces().moving(nothing, np.zeros((8, 8), dtype=np.int32), np.zeros(1), 0)
 
 
 def sensor_of(lattice: Lattice) -> tuple[float, float]:
@@ -55,11 +59,11 @@ class Surfaces:
 
     lattice: Lattice
     unexplained: Mask  # (rows, columns)
-    loose: Mask  # (rows, columns); on open ground, and no wall hangs together with it
+    loose: Mask  # (rows, columns); on open ground and no wall hangs together with it, or it has left ground
 
 
-def surfaces_of(frame: FrameLabels, remembered: Remembered) -> Surfaces:
-    """Tell static and other surfaces of a frame apart by what the memory knows.
+def surfaces_of(frame: FrameLabels, remembered: Remembered, traces: Traces, stamp_ns: int) -> Surfaces:
+    """Tell static and other surfaces of a frame apart by what the memory knows, and by the ground that they have left.
 
     A static surface may fall into the next cell as the robot moves, so what touches one is explained by it.  Where a wall
     comes into range, rays that end just before it make its cells free first, and so its end seems to have come there lately;
@@ -68,13 +72,14 @@ def surfaces_of(frame: FrameLabels, remembered: Remembered) -> Surfaces:
     lattice, seen = frame.grid.lattice, frame.grid.label == OCCUPIED
     static = transfer((remembered.grid.label == OCCUPIED) & ~remembered.came, remembered.grid.lattice, lattice, False)
     explained = cv2.dilate(static.view(np.uint8), NEIGHBOURS) != 0
-    _, component = cv2.connectedComponents(_joined(seen), connectivity=8)
-    unexplained = np.asarray(seen & ~explained)
-    length = int(component.max()) + 1
+    length, component, boxes, _ = cv2.connectedComponentsWithStats(_joined(seen), connectivity=8)
+    sides = boxes[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]] - 2  # (length, 2): it was joined by a cell all around
+    moving = traces.moving(frame.grid, component, lattice.cell_m * np.hypot(*sides.T), stamp_ns)[component]
+    unexplained = np.asarray(seen & (moving | ~explained))
     cells, loose_cells = (np.bincount(component[some], minlength=length) for some in (seen, unexplained))
     apart = loose_cells > STATIC_SHARE * cells
     open_ground = transfer(remembered.open, remembered.grid.lattice, lattice, False)
-    return Surfaces(lattice, unexplained, np.asarray(open_ground & apart[component]))
+    return Surfaces(lattice, unexplained, np.asarray(moving | (open_ground & apart[component])))
 
 
 def _joined(cells: Mask) -> U8:

@@ -24,6 +24,7 @@ from estimators.constant_velocity import PLANE, ConstantVelocity, Motion, correc
 from estimators.labelling import FrameLabels
 from estimators.remembered import Remembered
 from estimators.segmentation import Disc, Segment, centred, segments, surfaces_of
+from estimators.traces import Traces
 from estimators.tracking_settings import TrackingSettings
 
 SECOND_NS = 1_000_000_000
@@ -55,6 +56,7 @@ class GridTracker:
         self._tracks: list[Followed] = []  # by identity
         self._next_identity = 0
         self._stamp_ns = 0
+        self._traces = Traces()
 
     def warm_up(self) -> None:
         """Compile every kernel."""
@@ -66,7 +68,7 @@ class GridTracker:
         carry = ConstantVelocity((stamp_ns - self._stamp_ns) / SECOND_NS, settings.acceleration_m_s2)
         self._stamp_ns = stamp_ns
         tracks = [replace(one, motion=carry.carry(one.motion)) for one in self._tracks if self._recent(one, stamp_ns)]
-        surfaces = surfaces_of(frame, remembered)
+        surfaces = surfaces_of(frame, remembered, self._traces, stamp_ns)
         found = segments(surfaces, [track.disc for track in tracks], settings.cells_min, settings.radius_max_m)
         pairs = self._assign(tracks, found, lattice)
         tracks = [self._seen(track, found[pairs[i]], lattice) if i in pairs else track for i, track in enumerate(tracks)]
@@ -153,6 +155,7 @@ class GridTracker:
             seen_ns=np.array([track.seen_ns for track in tracks], dtype=np.int64),
             next_identity=self._next_identity,
             stamp_ns=self._stamp_ns,
+            traces=np.frombuffer(self._traces.snapshot(), dtype=np.uint8),
         )
 
     def restore(self, snapshot: bytes) -> None:
@@ -164,6 +167,7 @@ class GridTracker:
             Followed(identity, motion, radius_m, hits, seen_ns)
             for motion, identity, radius_m, hits, seen_ns in zip(motions, *numbers, strict=True)
         ]
+        self._traces.restore(state["traces"].tobytes())
         self._next_identity, self._stamp_ns = int(state["next_identity"]), int(state["stamp_ns"])
 
 

@@ -15,6 +15,7 @@ from estimators.memory import MemorySettings, memory_of
 from estimators.remembered import Remembered
 from estimators.rolling import lattice_around
 from estimators.segmentation import Disc, Surfaces, centred, segments, surfaces_of
+from estimators.traces import Traces
 from estimators.tracking import GridTracker, TrackingSettings
 from tests.estimators.scenes import MS, Floor, Pillar, Wall, frame
 
@@ -248,10 +249,10 @@ def test_what_touches_the_static_world_is_explained_by_it_and_what_hangs_togethe
     moving[40, end] = moving[40, other] = True
     frame_labels = FrameLabels(OccupancyGrid(LATTICE, seen), np.zeros(seen.shape, dtype=np.bool_))
     ground = np.ones(seen.shape, dtype=np.bool_)
-    surfaces = surfaces_of(frame_labels, Remembered(OccupancyGrid(LATTICE, known), moving, ground))
+    surfaces = surfaces_of(frame_labels, Remembered(OccupancyGrid(LATTICE, known), moving, ground), Traces(), 0)
     assert np.flatnonzero(surfaces.unexplained[40]).tolist() == [*range(31, 36), *range(60, 64)]
     assert [(len(one.points), one.loose) for one in segments(surfaces, [], 3, 0.6)] == [(5, False), (4, True)]
-    shut_in = surfaces_of(frame_labels, Remembered(OccupancyGrid(LATTICE, known), moving, ~ground))
+    shut_in = surfaces_of(frame_labels, Remembered(OccupancyGrid(LATTICE, known), moving, ~ground), Traces(), 0)
     assert [one.loose for one in segments(shut_in, [], 3, 0.6)] == [False, False]
 
 
