@@ -27,13 +27,14 @@ class ColourReader:
         """Expect another beginning of the stream."""
         self.stamps.restart()
 
-    def take(self, frame: Any, now_ns: int) -> None:
-        """Take in an `rs.video_frame` of format rgb8 that was read now."""
+    def take(self, frame: Any, now_ns: int) -> bool:
+        """Take in an `rs.video_frame` of format rgb8 that was read now; return whether it is a new one."""
         stamp = self.stamps.take(frame, now_ns)
         if stamp is None or now_ns < self._due_ns:
-            return
+            return stamp is not None
         self._due_ns = now_ns + self._period_ns
         picture = cv2.cvtColor(np.asanyarray(frame.get_data()), cv2.COLOR_RGB2BGR)
         done, jpeg = cv2.imencode(".jpg", picture, self._quality)
         if done and len(jpeg) <= LARGEST_PICTURE:
             self._slot.put(stamp.row, jpeg)
+        return True

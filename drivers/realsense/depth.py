@@ -26,13 +26,14 @@ class DepthReader:
         self.stamps.restart()
         self._chain = FilterChain(self._settings)
 
-    def take(self, frame: Any, now_ns: int) -> None:
-        """Take in an `rs.depth_frame` that was read now."""
+    def take(self, frame: Any, now_ns: int) -> bool:
+        """Take in an `rs.depth_frame` that was read now; return whether it is a new one."""
         stamp = self.stamps.take(frame, now_ns)
         if stamp is None:
-            return
+            return False
         filtered = self._chain.process(frame)
         k = filtered.get_profile().as_video_stream_profile().get_intrinsics()
         unit_m = float(f"{filtered.get_units():.6g}")  # librealsense keeps a float32
         size = (filtered.get_width(), filtered.get_height())
         self._slot.put((*stamp.row, *size, k.fx, k.fy, k.ppx, k.ppy, unit_m), np.asanyarray(filtered.get_data()))
+        return True

@@ -9,7 +9,7 @@ SPANS = 60
 STEADY_SPANS = 10  # before so many are over, the drift is taken for zero
 MOST_DRIFT = 300e-6  # crystals are better than 100 ppm, and there are two
 EARLY_NS = 50_000_000  # no stamp is so far ahead of its arrival: the device's clock has jumped
-LATE_NS = 5_000_000_000  # nor so far behind
+BACK_NS = 50_000_000  # frames come in order, and streams that share a clock nearly so
 
 Point = tuple[int, int]  # device time, arrival less device time [ns]
 
@@ -41,10 +41,11 @@ class DeviceClock:
         return self._slope
 
     def restart(self) -> None:
-        """Forget everything: the device was opened anew."""
+        """Forget everything: it is another clock from now on."""
         self._fastest: deque[Point] = deque(maxlen=SPANS)
         self._base_ns = 0  # what wrapped so far
         self._raw_ns: int | None = None
+        self._newest_ns = 0  # stamp
         self._span_ns = 0  # when the newest span began
         self._slope, self._foot_ns, self._offset_ns = 0.0, 0, 0
 
@@ -52,11 +53,12 @@ class DeviceClock:
         """Return when something with this stamp that arrived just now was captured."""
         stamp_ns = self._unwrapped(raw_ns)
         delay_ns = arrived_ns - stamp_ns
-        if self._fastest and not -EARLY_NS < delay_ns - self._line(stamp_ns) < LATE_NS:
+        if self._fastest and (delay_ns - self._line(stamp_ns) < -EARLY_NS or stamp_ns < self._newest_ns - BACK_NS):
             self.jumps += 1
             self.restart()
             stamp_ns = self._unwrapped(raw_ns)
             delay_ns = arrived_ns - stamp_ns
+        self._newest_ns = max(stamp_ns, self._newest_ns)
         self._learn(stamp_ns, delay_ns)
         return min(stamp_ns + self._line(stamp_ns), arrived_ns) - self._latency_ns
 

@@ -38,8 +38,10 @@ class EmulatedSource:
                 "start 'trundle emulate' with the same configuration"
             ) from error
         if self._depth is not None and self._motion is not None:
+            alike = rs.extrinsics()
+            alike.rotation, alike.translation = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0]
             for profile in self._motion.profiles:
-                profile.register_extrinsics_to(self._depth.profile, rs.extrinsics())
+                profile.register_extrinsics_to(self._depth.profile, alike)
 
     @property
     def device(self) -> Any:

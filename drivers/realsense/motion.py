@@ -40,19 +40,21 @@ class MotionReader:
         self._rates: deque[tuple[FrameStamp, Vector]] = deque()
         self._forces: deque[tuple[int, Vector]] = deque(maxlen=2)
 
-    def take_gyro(self, frame: Any, now_ns: int) -> None:
-        """Take in a rate that was read now."""
+    def take_gyro(self, frame: Any, now_ns: int) -> bool:
+        """Take in a rate that was read now; return whether it is a new one."""
         stamp = self.stamps.take(frame, now_ns)
         if stamp is not None:
             self._rates.append((stamp, _vector(frame)))
             self._join()
+        return stamp is not None
 
-    def take_accel(self, frame: Any, now_ns: int) -> None:
-        """Take in a specific force that was read now."""
+    def take_accel(self, frame: Any, now_ns: int) -> bool:
+        """Take in a specific force that was read now; return whether it is a new one."""
         stamp = self._accel_stamps.take(frame, now_ns)
         if stamp is not None:
             self._forces.append((stamp.captured_ns, _vector(frame)))
             self._join()
+        return stamp is not None
 
     def _join(self) -> None:
         """Give out every rate whose force is known."""

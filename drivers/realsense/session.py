@@ -29,7 +29,7 @@ LOOK_NS = 100_000_000  # between two looks for a camera that is not there
 DEPTH_WAITING = 2  # a queue of old images is of no use
 OTHERS_WAITING = 256
 
-Take = Callable[[Any, int], None]
+Take = Callable[[Any, int], bool]  # says whether the frame is a new one
 
 
 @dataclass(slots=True)
@@ -176,9 +176,11 @@ class RealSenseSession:
         return self._hearing("accelerometer", self._motion.take_accel)
 
     def _hearing(self, kind: str, take: Take) -> Take:
-        def heard(frame: Any, now_ns: int) -> None:
-            self._heard_ns[kind] = now_ns
-            take(frame, now_ns)
+        def heard(frame: Any, now_ns: int) -> bool:
+            is_new = take(frame, now_ns)
+            if is_new:
+                self._heard_ns[kind] = now_ns
+            return is_new
 
         return heard
 

@@ -53,9 +53,8 @@ class FrameStamps:
         return self._clock.drift
 
     def restart(self) -> None:
-        """Expect another beginning of counter and clock."""
+        """Expect another beginning of the counter: the camera was opened anew.  What is known of its clock still holds."""
         self._numbering.restart()
-        self._clock.restart()
 
     def take(self, frame: Any, now_ns: int) -> FrameStamp | None:
         """Return the stamp of an `rs.frame` that was read now, or None for one that had come already."""
