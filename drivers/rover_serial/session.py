@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 from drivers.interface.devices import DeviceState
 from drivers.interface.errors import DeviceError
 from drivers.io.session import Port
-from drivers.rover_serial.autopilots import MODE_FLAG_CUSTOM, Autopilot
+from drivers.rover_serial.arming import Arming
+from drivers.rover_serial.autopilots import Autopilot
 from drivers.rover_serial.commands import Commands, Result
 from drivers.rover_serial.frames import Frame, Framer, SequenceCounter
 from drivers.rover_serial.greeting import Greeting
-from drivers.rover_serial.messages import ARM_DISARM, DO_SET_MODE, Decoder, Message, Speaker
+from drivers.rover_serial.messages import ARM_DISARM, Decoder, Message, Speaker
 from drivers.rover_serial.place import Place
 from drivers.rover_serial.settings import LinkSettings
 from drivers.rover_serial.signing import Verifier, timestamp_of
@@ -32,8 +33,6 @@ from drivers.rover_serial.wire import Wire, open_wire
 
 HEARTBEAT_NS = 500_000_000  # ours; autopilots expect one a second
 ZERO_PERIOD_NS = 50_000_000  # between zeros; PX4 wants more than two a second
-RETRY_NS = 1_000_000_000  # after a refusal
-SETTLE_NS = 1_500_000_000  # until a heartbeat must show what was acknowledged
 CLOCK_NS = 1_000_000_000  # between questions for the time
 LOAD_NS = 1_000_000_000
 AUTOPILOT_COMPONENT = 1
@@ -92,10 +91,9 @@ class RoverSession:
             s, self._all.imu, self._vehicle, self._speaker, self._commands, self._clock, self._telemetry
         )  # fmt: skip
         self._phase, self._since_ns, self._began_ns = Phase.LISTENING, 0, -1
-        self._now_ns = self._heartbeat_ns = self._zero_ns = self._asked_ns = self._heard_ns = 0
+        self._now_ns = self._heartbeat_ns = self._zero_ns = self._asked_ns = 0
         self._brake_until_ns: int | None = None
-        self._tries_until_ns = self._retry_ns = self._settled_ns = 0
-        self._entered = False  # mode and arming were acknowledged
+        self._arming: Arming | None = None
         self._gathering = False
         self._bytes, self._load_ns = 0, 0
         self._health.state, self._health.fault = DeviceState.RECONNECTING, ""
@@ -122,7 +120,7 @@ class RoverSession:
         """
         self._now_ns = now_ns
         if self._began_ns < 0:
-            self._began_ns = self._heard_ns = self._load_ns = now_ns
+            self._began_ns = self._load_ns = now_ns
         try:
             self._receive(now_ns)
             self._check_silence(now_ns)
@@ -191,7 +189,6 @@ class RoverSession:
         message = self._decoder.decode(frame)
         if message is None:
             return
-        self._heard_ns = now_ns
         self._health.received += 1
         name = message.get_type()
         self._vehicle.take(name, message, now_ns)
@@ -249,7 +246,7 @@ class RoverSession:
             case Phase.WAITING:
                 self._wait(now_ns)
             case Phase.ENTERING:
-                self._go_on_entering(now_ns, autopilot)
+                self._go_on_entering(now_ns)
             case Phase.DRIVING:
                 if not self._vehicle.follows:
                     what = f"has left {autopilot.mode_name}" if self._vehicle.armed else "has disarmed"
@@ -266,7 +263,7 @@ class RoverSession:
         if self._port.reopened:
             if self._vehicle.follows:  # what armed it was lost with the wire, or an earlier process
                 self._set_point(0.0, 0.0, now_ns)
-                self._commands.ask(ARM_DISARM, (0.0,), lambda _: None)
+                self._disarm()
             self._fail("it was lost and is back; it is armed again after the operator's reset", now_ns)
         else:
             self._change(Phase.WAITING, now_ns)
@@ -281,46 +278,28 @@ class RoverSession:
 
     def _enter(self, now_ns: int) -> None:
         """Begin to arm."""
+        assert self._vehicle.autopilot is not None
         self._change(Phase.ENTERING, now_ns)
-        autopilot = self._vehicle.autopilot
-        assert autopilot is not None
-        self._tries_until_ns = now_ns + round((self._settings.arm_s + autopilot.stream_first_s) * 1e9)
-        self._retry_ns, self._entered = now_ns + round(autopilot.stream_first_s * 1e9), False
+        self._arming = Arming(self._vehicle.autopilot, self._commands, self._settings.arm_s, now_ns)
 
-    def _go_on_entering(self, now_ns: int, autopilot: Autopilot) -> None:
+    def _go_on_entering(self, now_ns: int) -> None:
+        """Send zero meanwhile."""
         if self._brake_until_ns is None and now_ns - self._zero_ns >= ZERO_PERIOD_NS:
             self._set_point(0.0, 0.0, now_ns)
-        if self._entered:
-            if self._vehicle.follows:
-                self._change(Phase.DRIVING, now_ns)
-            elif now_ns > self._settled_ns:
-                self._fail(f"the autopilot acknowledged {autopilot.mode_name} and arming, and is not so", now_ns)
-        elif self._commands.idle and now_ns >= self._retry_ns:
-            self._retry_ns = now_ns + RETRY_NS
-            mode = (float(MODE_FLAG_CUSTOM), *map(float, autopilot.mode))
-            self._commands.ask(DO_SET_MODE, mode, lambda result: self._mode_set(result, autopilot))
+        arming = self._arming
+        assert arming is not None
+        arming.step(now_ns, follows=self._vehicle.follows)
+        if arming.done:
+            self._change(Phase.DRIVING, now_ns)
+        elif arming.refusal:
+            self._fail(arming.refusal, now_ns)
 
-    def _mode_set(self, result: Result, autopilot: Autopilot) -> None:
-        if self._phase is not Phase.ENTERING:
-            return
-        if result is Result.ACCEPTED:
-            self._commands.ask(ARM_DISARM, (1.0,), self._armed)
-        else:
-            self._refused(f"the mode {autopilot.mode_name}", result)
-
-    def _armed(self, result: Result) -> None:
-        if self._phase is not Phase.ENTERING:
-            return
-        if result is Result.ACCEPTED:
-            self._entered, self._settled_ns = True, self._now_ns + SETTLE_NS
-        else:
-            self._refused("arming", result)
-
-    def _refused(self, what: str, result: Result) -> None:
-        """Try again in a while; not for ever."""
-        self._retry_ns = self._now_ns + RETRY_NS
-        if self._retry_ns > self._tries_until_ns:
-            self._fail(f"{what} {result.words}", self._now_ns)
+    def _disarm(self) -> None:
+        """Ask for nothing but that."""
+        if self._arming is not None:
+            self._arming.abandon()
+        self._commands.forget()
+        self._commands.ask(ARM_DISARM, (0.0,), lambda _: None)
 
     def _change(self, phase: Phase, now_ns: int) -> None:
         self._phase, self._since_ns = phase, now_ns
@@ -334,8 +313,7 @@ class RoverSession:
         """Take no more commands until the operator's reset; what still drives is told to stand."""
         if self._phase in {Phase.ENTERING, Phase.DRIVING}:
             self._set_point(0.0, 0.0, now_ns)
-            self._commands.forget()
-            self._commands.ask(ARM_DISARM, (0.0,), lambda _: None)
+            self._disarm()
         reason = self._vehicle.reason(now_ns)
         self._change(Phase.FAULTED, now_ns)
         self._health.state = DeviceState.FAULTED
@@ -349,8 +327,7 @@ class RoverSession:
             if now_ns - self._zero_ns >= ZERO_PERIOD_NS:
                 self._set_point(0.0, 0.0, now_ns)
             return
-        self._commands.forget()
-        self._commands.ask(ARM_DISARM, (0.0,), lambda _: None)
+        self._disarm()
         self._be_ready()
 
     def _chatter(self, now_ns: int) -> None:

@@ -78,9 +78,7 @@ class Telemetry:
         return self.speed_m_s < STANDING_M_S
 
     def _put(self, name: str, theirs_ns: int, now_ns: int, *values: tuple[float, ...]) -> bool:
-        if theirs_ns < self._newest_ns - RESTART_NS:
-            self.restarted = True
-        self._newest_ns = max(self._newest_ns, theirs_ns)
+        self._note_time(theirs_ns)
         if name not in self._rings or not self.live:
             return True
         captured_ns = self._clock.captured_ns(theirs_ns, now_ns, round(self._settings.latency_s * 1e9))
@@ -88,6 +86,10 @@ class Telemetry:
         if sequence is not None:
             self._rings[name].put((captured_ns, now_ns, sequence, *values))
         return sequence is not None
+
+    def _note_time(self, theirs_ns: int) -> None:
+        self.restarted = self.restarted or theirs_ns < self._newest_ns - RESTART_NS
+        self._newest_ns = max(self._newest_ns, theirs_ns)
 
     def _wheels(self, message: Message, now_ns: int) -> bool:
         s, theirs_ns = self._settings, message.time_usec * 1000
@@ -124,6 +126,7 @@ class Telemetry:
         return believed
 
     def _attitude(self, message: Message, now_ns: int) -> bool:
+        self._note_time(message.time_boot_ms * 1_000_000)
         yaw, rate = -message.yaw, -message.yawspeed  # clockwise from above is positive there
         if not (math.isfinite(yaw) and abs(rate) <= FASTEST_RAD_S):
             return False

@@ -86,7 +86,7 @@ class RoverAutopilot:
 
     Settings: ClassVar[type[Settings]] = RoverAutopilotSettings
     max_step_s = SkidSteerChassis.max_step_s
-    period_ns = 2 * SkidSteerChassis.period_ns
+    period_ns = 4 * SkidSteerChassis.period_ns
 
     def __init__(self, driver_settings: RoverWire, settings: RoverAutopilotSettings, setup: FirmwareSetup) -> None:
         """Join the world."""

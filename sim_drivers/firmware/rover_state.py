@@ -186,7 +186,10 @@ class RoverState:
 
     def _watch_stream(self, now_ns: int) -> None:
         if self._is_px4 and self.follows and now_ns - self._setpoint_ns > self.timeout_s * SECOND_NS:
-            self._time_out()
+            if self.armed:
+                self._time_out()
+            else:
+                self._enter(PX4_HOLD)
 
     def _watch_station(self, now_ns: int) -> None:
         s = self._settings
