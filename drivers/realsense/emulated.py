@@ -24,19 +24,21 @@ class EmulatedSource:
         Raises:
             DeviceError: no emulation has such a camera.
         """
-        rs = librealsense()
         self._name = device
-        self._device = rs.software_device()
-        for info, text in ((rs.camera_info.name, "emulated RealSense"), (rs.camera_info.serial_number, memory)):
-            self._device.register_info(info, text)
         try:
-            self._depth = _Depth(self._device, memory, camera) if camera is not None else None
-            self._motion = _Motion(self._device, memory, imu) if imu is not None else None
+            depth = attach(DepthWire, path_of(memory, "depth")) if camera is not None else None
+            motion = attach(MotionWire, path_of(memory, "motion")) if imu is not None else None
         except OSError as error:
             raise DeviceError(
                 f"{device}: no emulation has a camera '{memory}' ({error.strerror or error}); "
                 "start 'trundle emulate' with the same configuration"
             ) from error
+        rs = librealsense()
+        self._device = rs.software_device()
+        for info, text in ((rs.camera_info.name, "emulated RealSense"), (rs.camera_info.serial_number, memory)):
+            self._device.register_info(info, text)
+        self._depth = _Depth(self._device, depth, camera.rate_hz) if camera is not None and depth is not None else None
+        self._motion = _Motion(self._device, motion, imu.gyro_rate_hz) if imu is not None and motion is not None else None
         if self._depth is not None and self._motion is not None:
             alike = rs.extrinsics()
             alike.rotation, alike.translation = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0]
@@ -68,15 +70,15 @@ class EmulatedSource:
 class _Depth:
     """The stereo module."""
 
-    def __init__(self, device: Any, memory: str, settings: CameraSettings) -> None:
+    def __init__(self, device: Any, wire: DepthWire, rate_hz: int) -> None:
         """Look through the lens that the other end tells of."""
         rs = librealsense()
-        self.wire = attach(DepthWire, path_of(memory, "depth"))
-        lens = self.wire.lens
+        self.wire = wire
+        lens = wire.lens
         k = lens.intrinsics
         stream = rs.video_stream()
         stream.type, stream.index, stream.uid, stream.fmt, stream.bpp = rs.stream.depth, 0, 1, rs.format.z16, 2
-        stream.width, stream.height, stream.fps = k.width, k.height, settings.rate_hz
+        stream.width, stream.height, stream.fps = k.width, k.height, rate_hz
         pinhole = rs.intrinsics()
         pinhole.width, pinhole.height, pinhole.model = k.width, k.height, rs.distortion.brown_conrady
         pinhole.fx, pinhole.fy, pinhole.ppx, pinhole.ppy = k.fx, k.fy, k.cx, k.cy
@@ -107,16 +109,17 @@ class _Depth:
 class _Motion:
     """The motion module, its axes those of the depth stream."""
 
-    def __init__(self, device: Any, memory: str, settings: ImuSettings) -> None:
+    def __init__(self, device: Any, wire: MotionWire, rate_hz: int) -> None:
+        """Begin with what comes from now on."""
         rs = librealsense()
-        self.wire = attach(MotionWire, path_of(memory, "motion"))
-        self.wire.samples.skip()
+        self.wire = wire
+        wire.samples.skip()
         self._sensor = device.add_sensor("Motion Module")
         self.profiles = []
         for uid, kind in ((2, rs.stream.gyro), (3, rs.stream.accel)):
             stream = rs.motion_stream()
             stream.type, stream.index, stream.uid, stream.fmt = kind, 0, uid, rs.format.motion_xyz32f
-            stream.fps = settings.gyro_rate_hz
+            stream.fps = rate_hz
             self.profiles.append(self._sensor.add_motion_stream(stream))
 
     def pump(self) -> None:

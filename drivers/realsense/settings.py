@@ -17,7 +17,7 @@ class SourceSettings(Settings):
 
     source: Literal["live", "bag", "emulated"] = Field(default="live", description="a camera, a recording, `trundle emulate`")
     serial_number: str = Field(default="", max_length=32, description="live: of the camera; empty: the only one there is")
-    path: Path | None = Field(default=None, description="bag: the recording")
+    path: Path | None = Field(default=None, description="bag: the recording, .bag or .db3")
     memory: str = Field(default="camera", pattern=r"^[A-Za-z0-9_-]{1,40}$", description="emulated: name of the shared memory")
     connect_s: float = Field(default=5.0, gt=0.1, le=60.0, description="until the first frame must have come")
     silent_s: float = Field(default=0.5, gt=0.05, le=10.0, description="without a frame for so long the camera is lost")

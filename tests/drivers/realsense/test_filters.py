@@ -4,59 +4,13 @@ import numpy as np
 import pytest
 
 from drivers.realsense.filters import FilterChain, FilterSettings
-from drivers.realsense.library import librealsense
-
-SHAPE = (480, 848)
-
-
-class Imager:
-    """A software device that turns arrays into frames."""
-
-    def __init__(self):
-        rs = self.rs = librealsense()
-        stream = rs.video_stream()
-        stream.type, stream.fmt, stream.bpp, stream.uid = rs.stream.depth, rs.format.z16, 2, 1
-        stream.width, stream.height, stream.fps = SHAPE[1], SHAPE[0], 30
-        pinhole = rs.intrinsics()
-        pinhole.width, pinhole.height, pinhole.fx, pinhole.fy, pinhole.ppx, pinhole.ppy = (
-            SHAPE[1],
-            SHAPE[0],
-            434.0,
-            434.0,
-            424.0,
-            240.0,
-        )
-        stream.intrinsics = pinhole
-        self.device = rs.software_device()
-        self.sensor = self.device.add_sensor("Stereo Module")
-        self.profile = self.sensor.add_video_stream(stream)
-        self.sensor.add_read_only_option(rs.option.depth_units, 0.001)
-        self.sensor.add_read_only_option(rs.option.stereo_baseline, 95.0)
-        self.queue = rs.frame_queue(2)
-        self.sensor.open(self.profile)
-        self.sensor.start(self.queue)
-        self.number = 0
-
-    def frame(self, depth):
-        self.number += 1
-        frame = self.rs.software_video_frame()
-        frame.profile, frame.frame_number, frame.timestamp = (
-            self.profile.as_video_stream_profile(),
-            self.number,
-            33.0 * self.number,
-        )
-        frame.bpp, frame.stride, frame.depth_units, frame.pixels = 2, 2 * SHAPE[1], 0.001, depth
-        self.sensor.on_video_frame(frame)
-        return self.queue.wait_for_frame()
-
-    def close(self):
-        self.sensor.stop()
-        self.sensor.close()
+from tests.drivers.realsense.imager import SHAPE, Imager
 
 
 @pytest.fixture
 def imager():
     made = Imager()
+    made.start()
     yield made
     made.close()
 
