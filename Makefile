@@ -2,7 +2,7 @@
 
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help demo picture test lint bench wheel clean
+.PHONY: help demo picture test lint bench faults wheel clean
 
 STAMP := .venv/.stamp
 BIN := .venv/bin
@@ -35,6 +35,9 @@ lint: $(STAMP)  ## format, lint, types and layer contracts only
 
 bench: $(STAMP)  ## measure every figure beside its budget and its peer (ARGS=pacer for some)
 	$(BIN)/python -m tests.benchmarks.run $(ARGS)
+
+faults: $(STAMP)  ## let devices misbehave by script and print who answered what, how soon (ARGS=can for some)
+	$(BIN)/python -m tests.faults.campaign $(ARGS)
 
 wheel: $(STAMP)  ## build the wheel into dist/
 	rm -rf build

@@ -42,20 +42,25 @@ def until(holds: Callable[[], bool], what: str) -> None:
 
 @dataclass
 class EmulatedRobot:
-    """`trundle emulate` of the XLeRobot on ports of its own."""
+    """`trundle emulate` of the XLeRobot, or of another robot with its base, on ports of its own."""
 
+    robot: str = "xlerobot_emulated"
     can_port: int = field(default_factory=free_port)
     truth_port: int = field(default_factory=free_port)
     lines: list[str] = field(default_factory=list)
 
     @property
-    def changes(self) -> list[str]:
+    def overrides(self) -> tuple[str, ...]:
         """What emulation and run must both be told."""
-        told = (
-            "robot=xlerobot_emulated", f"robot.base.bus.port={self.can_port}", f"robot.truth.port={self.truth_port}",
+        return (
+            f"robot={self.robot}", f"robot.base.bus.port={self.can_port}", f"robot.truth.port={self.truth_port}",
             "robot.base.connect_s=20", "robot.truth.open_timeout_s=30",
         )  # fmt: skip
-        return [word for change in told for word in ("--set", change)]
+
+    @property
+    def changes(self) -> list[str]:
+        """The same for a command line."""
+        return [word for change in self.overrides for word in ("--set", change)]
 
     @property
     def worlds(self) -> int:
@@ -88,17 +93,17 @@ def trundle(*arguments: str, **options: object) -> "subprocess.Popen[str]":
 
 
 @contextmanager
-def emulated(*changes: str) -> Iterator[EmulatedRobot]:
+def emulated(*changes: str, robot: str = "xlerobot_emulated") -> Iterator[EmulatedRobot]:
     """Emulate within the block; the world's process is put before others where that is permitted."""
-    robot = EmulatedRobot()
+    emulation = EmulatedRobot(robot)
     more = [word for change in (*changes, "loop.system.priority=20") for word in ("--set", change)]
-    process = trundle("emulate", "square", *robot.changes, *more)
-    reader = threading.Thread(target=lambda: robot.lines.extend(iter(process.stdout.readline, "")))
+    process = trundle("emulate", "square", *emulation.changes, *more)
+    reader = threading.Thread(target=lambda: emulation.lines.extend(iter(process.stdout.readline, "")))
     reader.start()
     try:
-        until(lambda: robot.worlds > 0 or process.poll() is not None, "the emulation never became ready")
-        assert robot.worlds > 0, robot.lines
-        yield robot
+        until(lambda: emulation.worlds > 0 or process.poll() is not None, "the emulation never became ready")
+        assert emulation.worlds > 0, emulation.lines
+        yield emulation
     finally:
         process.terminate()
         try:

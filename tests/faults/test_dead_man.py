@@ -7,7 +7,7 @@ import pytest
 from tests.faults.dead_man import attempt
 from tests.faults.emulated import EmulatedRobot, Watcher, emulated
 
-TRIES = 5
+TRIES = 2
 
 
 @pytest.fixture(scope="module")
