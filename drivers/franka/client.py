@@ -52,6 +52,10 @@ class Client(Protocol):
         """Answer the newest state with a set point; the last one ends the motion."""
         ...
 
+    def prepare(self) -> None:
+        """Set impedance and thresholds.  Raises MotionAbortedError where the controller refuses, as it does unless it is idle."""
+        ...
+
     def recover(self) -> None:
         """Clear a reflex; waits until it is done.  Raises MotionAbortedError when it cannot be."""
         ...
@@ -65,10 +69,10 @@ class LibfrankaClient:
     """A connection through pylibfranka."""
 
     def __init__(self, name: str, settings: FrankaSettings) -> None:
-        """Connect and set the arm up.
+        """Connect.
 
         Raises:
-            DeviceError: no pylibfranka, nobody there, another protocol, or a controller that refuses.
+            DeviceError: no pylibfranka, nobody there, or another protocol.
         """
         self._lib = _library(name)
         self._name = name
@@ -79,9 +83,7 @@ class LibfrankaClient:
         real_time = lib.RealtimeConfig.kEnforce if s.real_time_kernel else lib.RealtimeConfig.kIgnore
         try:
             self._robot: Any = lib.Robot(s.host, real_time)
-            self._robot.set_collision_behavior(s.contact_torque_nm, s.collision_torque_nm, s.contact_force_n, s.collision_force_n)
-            self._robot.set_joint_impedance(s.joint_stiffness_nm_rad)
-        except RuntimeError as error:
+        except (RuntimeError, self._lib.FrankaException) as error:
             raise DeviceError(f"{name}: the arm at {s.host} cannot be used: {sentence(error)}") from error
         self._settle()
 
@@ -97,7 +99,7 @@ class LibfrankaClient:
         except self._lib.ControlException as error:
             self._control = None
             raise MotionAbortedError(sentence(error)) from error
-        except RuntimeError as error:
+        except (RuntimeError, self._lib.FrankaException) as error:
             raise self._lost(error) from error
         joints = (state.q, state.dq, state.tau_J, state.q_d, state.dq_d, state.ddq_d)
         position, velocity, torque, target, target_velocity, target_acceleration = (np.array(each) for each in joints)
@@ -127,7 +129,7 @@ class LibfrankaClient:
             self._control = self._robot.start_joint_position_control(modes.JointImpedance if joint else modes.CartesianImpedance)
         except (self._lib.ControlException, self._lib.CommandException) as error:
             raise MotionAbortedError(sentence(error)) from error
-        except RuntimeError as error:
+        except (RuntimeError, self._lib.FrankaException) as error:
             raise self._lost(error) from error
         self._settle()
 
@@ -145,10 +147,26 @@ class LibfrankaClient:
         except self._lib.ControlException as error:
             self._control = None
             raise MotionAbortedError(sentence(error)) from error
-        except RuntimeError as error:
+        except (RuntimeError, self._lib.FrankaException) as error:
             raise self._lost(error) from error
         if last:
             self._control = None
+
+    def prepare(self) -> None:
+        """Set impedance and thresholds.
+
+        Raises:
+            MotionAbortedError: the controller refuses.
+            DeviceError: the wire is lost.
+        """
+        s = self._settings
+        try:
+            self._robot.set_collision_behavior(s.contact_torque_nm, s.collision_torque_nm, s.contact_force_n, s.collision_force_n)
+            self._robot.set_joint_impedance(s.joint_stiffness_nm_rad)
+        except self._lib.CommandException as error:
+            raise MotionAbortedError(sentence(error)) from error
+        except (RuntimeError, self._lib.FrankaException) as error:
+            raise self._lost(error) from error
 
     def recover(self) -> None:
         """Clear a reflex.
@@ -161,7 +179,7 @@ class LibfrankaClient:
             self._robot.automatic_error_recovery()
         except (self._lib.ControlException, self._lib.CommandException) as error:
             raise MotionAbortedError(sentence(error)) from error
-        except RuntimeError as error:
+        except (RuntimeError, self._lib.FrankaException) as error:
             raise self._lost(error) from error
 
     def close(self) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import ClassVar
 
 from drivers.franka.orders import CAPACITY, MOST_KNOTS, packed
@@ -19,6 +21,16 @@ from drivers.io.process import IoProcess, IoSpec
 
 MEMORY = MemorySpec((RingSpec("joints", SAMPLE, 2048),), (), command_values=CAPACITY)
 LONGEST_REQUEST_S = 6.0  # a recovery takes its time, and meanwhile the process waits
+
+
+@dataclass(frozen=True, slots=True)
+class ExchangeFigures:
+    """How well the 1 kHz exchange keeps up, since `open`."""
+
+    cycles: int  # states that were answered with a set point
+    kept: float  # share of the motion's commands that the controller had in time
+    resumed: int  # times that the set point went on from the controller's own
+    states_lost: int  # that the controller sent and that never came, or came together
 
 
 class FrankaArm:
@@ -111,7 +123,17 @@ class FrankaArm:
             expected_period_ns=self._settings.decimation * 1_000_000,
         )
 
+    @property
+    def exchange(self) -> ExchangeFigures:
+        """How well the exchange keeps up."""
+        kept, resumed, cycles, states_lost = self._io.health().figures[:4]
+        return ExchangeFigures(_count(cycles), kept, _count(resumed), _count(states_lost))
+
     def identity(self) -> DeviceIdentity:
         """Return who answers."""
         record = self._io.health()
         return DeviceIdentity(self._setup.name, "Franka arm", record.firmware, record.protocol)
+
+
+def _count(figure: float) -> int:
+    return 0 if math.isnan(figure) else round(figure)

@@ -33,11 +33,12 @@ SAMPLE = np.dtype(
         ("torque_nm", "f8", (7,)),
     ]
 )
+GRACE_STATES = 200  # for opening to succeed: an arm in a reflex is there, and the operator's reset must be able to reach it
 READY_MODES = frozenset({"Idle", "Move", "AutomaticErrorRecovery"})
 BRAKE_MS = 1500  # the longest that closing waits for the arm to stand
 BELIEVED_RAD = 0.1  # beyond a joint's range
 FROZEN_AFTER = 20  # equal states in a row: a torque sensor is never so quiet
-SUCCESS_RATE, RESUMED, CYCLES, STATES_LOST = range(4)  # places in the health's figures
+KEPT, RESUMED, CYCLES, STATES_LOST = range(4)  # places in the health's figures
 
 
 class Phase(enum.Enum):
@@ -70,6 +71,7 @@ class FrankaSession:
         self._last: ArmState | None = None
         self._sequence = 0
         self._phase = Phase.READY
+        self._prepared = False
 
     def open(self) -> None:
         """Connect; the arm stays at rest.
@@ -81,12 +83,15 @@ class FrankaSession:
         self._health.protocol = f"FCI, libfranka {getattr(self._client, 'version', '')}".strip()
         self._robot_clock = RobotClock()
         self._exchange, self._last = None, None
-        self._equal = self._cycles = self._resumed = self._states_lost = 0
+        self._seen = self._equal = self._cycles = self._resumed = self._states_lost = 0
+        self._kept = 0.0  # sum of the success rates
         self._first_slot: int | None = None
         self._base = max(self._ring.written, self._sequence)
-        self._be_ready()
+        self._prepared = False
         if self._port.reopened:
             self._fail("it was lost and is back; it moves again after the operator's reset")
+        else:
+            self._be_ready()
 
     def wakes_on(self) -> tuple[int, ...]:
         """Return nothing: polling waits for the next state itself."""
@@ -116,7 +121,7 @@ class FrankaSession:
     def send(self, values: NDArray[np.float64], now_ns: int) -> None:
         """Follow a trajectory; the first one begins a motion."""
         trajectory = unpacked(values)
-        if self._phase is Phase.FAULTED or self._last is None or self._client is None:
+        if self._phase is Phase.FAULTED or not self._prepared or self._last is None or self._client is None:
             return
         if trajectory.is_rest:
             self.rest()
@@ -140,7 +145,7 @@ class FrankaSession:
         if self._phase is not Phase.FAULTED or self._client is None:
             return
         try:
-            if self._last is not None and self._last.mode == "Reflex":
+            if self._client.read().mode == "Reflex":
                 self._client.recover()
             self._be_ready()
         except MotionAbortedError as aborted:
@@ -170,20 +175,27 @@ class FrankaSession:
         resumed = exchange.resumed
         client.write(exchange.answer(state), last=exchange.is_over)
         self._cycles += 1
+        self._kept += state.success_rate
         self._resumed += exchange.resumed - resumed
         if exchange.is_over:
             self._exchange, self._phase = None, Phase.READY
         figures = self._health.figures
-        figures[SUCCESS_RATE], figures[RESUMED], figures[CYCLES] = state.success_rate, self._resumed, self._cycles
+        figures[KEPT], figures[RESUMED], figures[CYCLES] = self._kept / self._cycles, self._resumed, self._cycles
 
     def _judge(self, state: ArmState) -> None:
-        """See, while no motion runs, whether one could."""
+        """See, while no motion runs, whether one could, and set the arm up for it."""
+        self._seen += 1
+        if self._seen <= GRACE_STATES and state.mode != "Idle":
+            return
         if state.mode == "UserStopped":
             self._fail("the user stop is pressed; release it, then reset")
         elif state.mode == "Reflex" and self._phase is not Phase.FAULTED:
             self._abort(f"a reflex has stopped the arm: {state.errors or 'no reason is given'}")
         elif state.mode not in READY_MODES and state.mode != "Reflex":
             self._fail(f"the controller is in the mode {state.mode} and takes no motion; unlock the joints and activate FCI")
+        elif state.mode == "Idle" and not self._prepared and self._client is not None:
+            self._client.prepare()
+            self._prepared = True
 
     def _abort(self, reason: str) -> None:
         """A motion has ended, or could not begin, at the controller's will."""

@@ -92,7 +92,9 @@ class TrajectoryFollower:
         limits, cap = self._limits, self._limits.acceleration_rad_s2
         slowest = -self._safe_speed(self.position_rad - limits.position_min_rad)
         fastest = self._safe_speed(limits.position_max_rad - self.position_rad)
-        asked = acceleration + VELOCITY_GAIN_1_S * (np.clip(velocity, slowest, fastest) - self.velocity_rad_s)
+        admitted = np.clip(velocity, slowest, fastest)
+        acceleration = np.where(admitted == velocity, acceleration, 0.0)  # at a cap it would carry the joint beyond
+        asked = acceleration + VELOCITY_GAIN_1_S * (admitted - self.velocity_rad_s)
         jerk = limits.jerk_rad_s3 * dt_s
         asked = np.clip(np.clip(asked, -cap, cap), self._acceleration - jerk, self._acceleration + jerk)
         self._acceleration = asked

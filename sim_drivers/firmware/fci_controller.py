@@ -25,6 +25,7 @@ from sim_drivers.firmware.fci_protocol import (
     Error,
     MoveStatus,
     Request,
+    RobotMode,
     blank_state,
 )
 from sim_drivers.firmware.firmware import FirmwareSetup
@@ -68,7 +69,7 @@ class FciController:
         self._faults = FciFaults(settings.faults, stream(setup.seed, f"{setup.name}.faults"))
         self._rng = stream(setup.seed, f"{setup.name}.joints")
         self.machine = Machine(np.array(settings.start_rad), self._motion_ended, self._recovered)
-        self.answered = False  # whether the client has answered the newest state
+        self.told = False  # whether the newest state is on its way to a client
         self._reflex_nm = np.full(7, settings.collision_nm)
         self._state = blank_state()
         self._measured_ns = -1
@@ -116,7 +117,8 @@ class FciController:
         self._joints.drive(world, self.machine.set_point.position_rad, self.machine.set_point.velocity_rad_s)
         self._look(world, scene_ns)
         self._state["message_id"] += 1
-        if not silent and not self._faults.loses("lose_states", scene_ns):
+        self.told = self._port.is_connected and not silent and not self._faults.loses("lose_states", scene_ns)
+        if self.told:
             self._port.send(self._state.tobytes())
         for asked, status in self._outbox:
             self._port.answer(asked, status)
@@ -137,7 +139,6 @@ class FciController:
         for command in self._port.commands():
             if int(command["message_id"][0]) == newest and not self._faults.loses("lose_commands", scene_ns):
                 found = command
-        self.answered = found is not None
         return found
 
     def _serve(self, asked: Asked, world: MujocoWorld) -> None:
@@ -159,9 +160,11 @@ class FciController:
             case Request.GET_ROBOT_MODEL:
                 self._port.answer(asked, SUCCESS, self._urdf)
             case _:
-                self._port.answer(asked, NOT_POSSIBLE if self.machine.is_moving else self._set(asked, world))
+                self._port.answer(asked, self._set(asked, world))
 
     def _set(self, asked: Asked, world: MujocoWorld) -> int:
+        if self.machine.mode is not RobotMode.IDLE:
+            return NOT_POSSIBLE
         if asked.request is Request.SET_JOINT_IMPEDANCE:
             self._joints.stiffen(world, asked.doubles())
         elif asked.request is Request.SET_COLLISION_BEHAVIOR:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from sim_drivers.firmware.fci_controller import FciController
 from sim_drivers.world import MujocoWorld
 
-PATIENCE_S = 0.3  # a state that begins a motion is not answered; nor is one that was lost
+PATIENCE_S = 0.3  # a state that begins a motion is not answered
 IDLE_S = 0.001
 
 
@@ -18,7 +18,8 @@ def run_lockstep(world: MujocoWorld, controller: FciController, over: Callable[[
     """
     while not over():
         if controller.machine.is_moving:
-            controller.await_client(PATIENCE_S)
+            if controller.told:
+                controller.await_client(PATIENCE_S)
             world.step_to(world.now_ns + world.step_ns)
         else:
             controller.await_client(IDLE_S)

@@ -1,15 +1,12 @@
 """An emulated FCI controller in a process of its own: pylibfranka holds the interpreter's lock while it waits for it."""
 
-import json
+import multiprocessing
 import os
 import random
 import socket
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from drivers.interface.geometry import SE2
@@ -19,7 +16,8 @@ from sim_drivers.firmware.firmware import FirmwareSetup, LockstepHost
 from sim_drivers.scene import Scene
 from sim_drivers.world import MujocoWorld, WorldSettings
 
-ROOT = Path(__file__).parents[3]
+FORKS = multiprocessing.get_context("forkserver")  # MuJoCo is loaded once
+FORKS.set_forkserver_preload([__name__])
 
 
 @dataclass(frozen=True)
@@ -51,23 +49,21 @@ def free_host() -> str:
 @contextmanager
 def lockstep_server(seed: int = 1, **settings: Any) -> Iterator[str]:
     """Serve in lockstep within the block; yields the address."""
-    host = free_host()
-    told = [sys.executable, "-m", "tests.sim_drivers.firmware.fcibench", host, str(seed), json.dumps(settings)]
-    with subprocess.Popen(told, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
-        try:
-            assert process.stdout.readline() == "ready\n"
-            yield host
-        finally:
-            process.kill()
+    host, (ours, theirs) = free_host(), FORKS.Pipe()
+    process = FORKS.Process(target=_serve, args=(theirs, host, seed, settings), daemon=True)
+    process.start()
+    try:
+        assert ours.recv() == "ready"
+        yield host
+    finally:
+        process.kill()
+        process.join()
+        ours.close()
 
 
-def main() -> None:
+def _serve(told: Any, host: str, seed: int, settings: dict[str, Any]) -> None:
     parent = os.getppid()
-    world, controller = controller_of(sys.argv[1], int(sys.argv[2]), **json.loads(sys.argv[3]))
+    world, controller = controller_of(host, seed, **settings)
     controller.open()
-    print("ready", flush=True)
+    told.send("ready")
     run_lockstep(world, controller, lambda: os.getppid() != parent)
-
-
-if __name__ == "__main__":
-    main()
