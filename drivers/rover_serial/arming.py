@@ -7,7 +7,6 @@ from drivers.rover_serial.commands import Commands, Result
 from drivers.rover_serial.messages import ARM_DISARM, DO_SET_MODE
 
 RETRY_NS = 1_000_000_000  # after a refusal
-SETTLE_NS = 1_500_000_000  # until a heartbeat must show what was acknowledged
 REASON_NS = 300_000_000  # a reason may come a moment after the refusal
 
 
@@ -21,7 +20,7 @@ class Arming:
         self._until_ns = self._retry_ns + round(patience_s * 1e9)
         self._now_ns = now_ns
         self._outcome = ""  # why it will not be
-        self._settled_ns: int | None = None  # when the outcome, or what was acknowledged, must show
+        self._told_ns = 0  # when it is told
         self._over = False
         self.done = False
         self.refusal = ""
@@ -30,17 +29,14 @@ class Arming:
         """Leave it; what is answered later does not count."""
         self._over = True
 
-    def step(self, now_ns: int, *, follows: bool) -> None:
-        """Go on; `follows` is what the newest heartbeat says."""
+    def step(self, now_ns: int) -> None:
+        """Go on."""
         self._now_ns = now_ns
-        if self._settled_ns is None:
-            if self._commands.idle and now_ns >= self._retry_ns:
-                self._retry_ns = now_ns + RETRY_NS
-                self._commands.ask(DO_SET_MODE, (float(MODE_FLAG_CUSTOM), *map(float, self._autopilot.mode)), self._mode_set)
-        elif not self._outcome and follows:
-            self.done = True
-        elif now_ns > self._settled_ns:
-            self.refusal = self._outcome or f"the autopilot acknowledged {self._autopilot.mode_name} and arming, and is not so"
+        if self._outcome:
+            self.refusal = self._outcome if now_ns >= self._told_ns else ""
+        elif not self.done and self._commands.idle and now_ns >= self._retry_ns:
+            self._retry_ns = now_ns + RETRY_NS
+            self._commands.ask(DO_SET_MODE, (float(MODE_FLAG_CUSTOM), *map(float, self._autopilot.mode)), self._mode_set)
 
     def _mode_set(self, result: Result) -> None:
         if self._over:
@@ -54,11 +50,11 @@ class Arming:
         if self._over:
             return
         if result is Result.ACCEPTED:
-            self._settled_ns = self._now_ns + SETTLE_NS
+            self.done = True
         else:
             self._refused(f"arming {result.words}")
 
     def _refused(self, what: str) -> None:
         self._retry_ns = self._now_ns + RETRY_NS
         if self._retry_ns > self._until_ns:
-            self._outcome, self._settled_ns = what, self._now_ns + REASON_NS
+            self._outcome, self._told_ns = what, self._now_ns + REASON_NS

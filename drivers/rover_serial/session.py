@@ -33,6 +33,7 @@ from drivers.rover_serial.wire import Wire, open_wire
 
 HEARTBEAT_NS = 500_000_000  # ours; autopilots expect one a second
 ZERO_PERIOD_NS = 50_000_000  # between zeros; PX4 wants more than two a second
+SETTLE_NS = 1_500_000_000  # until a heartbeat must show what was acknowledged
 CLOCK_NS = 1_000_000_000  # between questions for the time
 LOAD_NS = 1_000_000_000
 AUTOPILOT_COMPONENT = 1
@@ -94,6 +95,8 @@ class RoverSession:
         self._now_ns = self._heartbeat_ns = self._zero_ns = self._asked_ns = 0
         self._brake_until_ns: int | None = None
         self._arming: Arming | None = None
+        self._twist = (0.0, 0.0)  # of the newest order
+        self._followed = False  # a heartbeat has shown what was acknowledged
         self._gathering = False
         self._bytes, self._load_ns = 0, 0
         self._health.state, self._health.fault = DeviceState.RECONNECTING, ""
@@ -133,12 +136,13 @@ class RoverSession:
         self._tell(now_ns)
 
     def send(self, values: NDArray[np.float64], now_ns: int) -> None:
-        """Send a twist: vx [m/s] and wz [rad/s], shape (2,); while it is being armed, zero."""
+        """Send a twist: vx [m/s] and wz [rad/s], shape (2,); while it is being armed zero, and the twist once it is."""
         self._now_ns, self._brake_until_ns = now_ns, None
+        vx_m_s, wz_rad_s = values.tolist()
+        self._twist = (vx_m_s, wz_rad_s)
         if self._phase is Phase.READY:
             self._enter(now_ns)
         if self._phase is Phase.DRIVING:
-            vx_m_s, wz_rad_s = values.tolist()
             self._set_point(vx_m_s, wz_rad_s, now_ns)
         elif self._phase is Phase.ENTERING:
             self._set_point(0.0, 0.0, now_ns)
@@ -248,7 +252,9 @@ class RoverSession:
             case Phase.ENTERING:
                 self._go_on_entering(now_ns)
             case Phase.DRIVING:
-                if not self._vehicle.follows:
+                self._followed = self._followed or self._vehicle.follows
+                unconfirmed = not self._followed and now_ns - self._since_ns <= SETTLE_NS
+                if not self._vehicle.follows and not unconfirmed:
                     what = f"has left {autopilot.mode_name}" if self._vehicle.armed else "has disarmed"
                     self._fail(f"the autopilot {what}", now_ns)
 
@@ -288,9 +294,12 @@ class RoverSession:
             self._set_point(0.0, 0.0, now_ns)
         arming = self._arming
         assert arming is not None
-        arming.step(now_ns, follows=self._vehicle.follows)
+        arming.step(now_ns)
         if arming.done:
             self._change(Phase.DRIVING, now_ns)
+            self._followed = False
+            if self._brake_until_ns is None:
+                self._set_point(*self._twist, now_ns)
         elif arming.refusal:
             self._fail(arming.refusal, now_ns)
 

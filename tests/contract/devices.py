@@ -172,7 +172,8 @@ def bench(driver: str, seed: int = 5, *, missing: bool = False, **settings: Any)
     elsewhere = None if rig is None or missing else FreeRunning(driver, chosen, rig, world, seed)
     tested = Bench(None, world, elsewhere)
     tested.device = cls(chosen, DeviceSetup("tested", seed, tested.now_ns, None if rig else world))
-    carrier = None if tested.is_base else device_of("sim_omni", world, "carrier")
+    served = rig is not None and rig.served_by  # it rides on what serves it
+    carrier = None if tested.is_base or served else device_of("sim_omni", world, "carrier")
     world.compile()
     if carrier is not None and not hasattr(cls, "command"):
         carrier.open()

@@ -23,6 +23,7 @@ class Rig:
     driver: dict[str, Any]
     firmware: dict[str, Any] = field(default_factory=dict)
     hasty: dict[str, Any] = field(default_factory=dict)  # settings of a driver that soon gives a missing device up
+    served_by: str = ""  # the driver whose firmware serves this one too, on the same wire
 
 
 def omni_can() -> Rig:
@@ -31,12 +32,23 @@ def omni_can() -> Rig:
     return Rig(settings, {"boot_s": 0.0, "axis": {"watchdog_s": 2.0}}, hasty={"connect_s": 0.3})
 
 
+def rover_serial() -> Rig:
+    settings = {"url": f"tcp:127.0.0.1:{free_port()}", "connect_s": 20.0}
+    return Rig(settings, {"boot_s": 0.0, "estimate_s": 0.0}, hasty={"connect_s": 0.6})
+
+
+def rover_imu() -> Rig:
+    return Rig({"url": f"tcp:127.0.0.1:{free_port()}"}, {"boot_s": 0.0, "estimate_s": 0.0}, served_by="rover_serial")
+
+
 def emulated_truth() -> Rig:
     return Rig({"port": free_port()}, hasty={"open_timeout_s": 0.3})
 
 
 RIGS: dict[str, Callable[[], Rig]] = {  # by the driver's name
     "omni_can": omni_can,
+    "rover_serial": rover_serial,
+    "rover_imu": rover_imu,
     "emulated_truth": emulated_truth,
 }
 
@@ -46,7 +58,9 @@ class FreeRunning:
 
     def __init__(self, driver: str, driver_settings: object, rig: Rig, world: MujocoWorld, seed: int) -> None:
         """Join the world, which is compiled later."""
-        cls = load(Part.FIRMWARE, driver)
+        cls = load(Part.FIRMWARE, rig.served_by or driver)
+        if rig.served_by:
+            driver_settings = load(Part.DRIVER, rig.served_by).Settings(**rig.driver)
         self._run = FreeRun(world)
         self._firmware = cls(driver_settings, cls.Settings(**rig.firmware), FirmwareSetup("tested", seed, world, self._run))
         self._over = threading.Event()
