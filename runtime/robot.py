@@ -10,6 +10,7 @@ from typing import TypeVar
 from drivers.interface.commands import Command
 from drivers.interface.devices import (
     Arm,
+    ColourCamera,
     DepthCamera,
     Device,
     DeviceHealth,
@@ -63,6 +64,7 @@ class Robot:
         self.devices = devices
         self._mission = mission
         self._named = tuple(devices)
+        self._colour = devices.camera if isinstance(devices.camera, ColourCamera) else None
         self._broken = {name: DeviceHealth(name, DeviceState.FAULTED) for name, _ in devices}
         self._failures: dict[str, str] = {}  # what each device has raised since the last tick
 
@@ -98,6 +100,7 @@ class Robot:
             scans=self._ask("scan", d.scan.drain, ()) if d.scan else (),
             operator=events,
             truth=self._ask("truth", d.truth.latest, None) if d.truth else None,
+            colour=self._ask("camera", self._colour.latest_colour, None) if self._colour else None,
             health=tuple(self._health(name, device) for name, device in self._named),
             mission=self._mission.fold(events),
             markers=self._ask("markers", d.markers.drain, ()) if d.markers else (),

@@ -17,6 +17,7 @@ from drivers.interface.kinematics import WheelKinematics
 from drivers.interface.links import Links
 from drivers.interface.samples import (
     BaseSample,
+    ColourFrame,
     DepthFrame,
     ImuSample,
     JointSample,
@@ -142,6 +143,15 @@ class MarkerCamera(Device, Protocol):
 
     def drain(self) -> tuple[MarkerSample, ...]:
         """Return what was seen in every image since the last call, oldest first."""
+        ...
+
+
+@runtime_checkable
+class ColourCamera(Protocol):
+    """A camera that also has pictures for the human eye; nothing in the loop reads them."""
+
+    def latest_colour(self) -> ColourFrame | None:
+        """Return the newest picture not yet returned, or None."""
         ...
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from drivers.interface.devices import DeviceHealth
 from drivers.interface.mission import Mission
 from drivers.interface.samples import (
     BaseSample,
+    ColourFrame,
     DepthFrame,
     ImuSample,
     JointSample,
@@ -46,3 +47,4 @@ class Sensed:
     health: tuple[DeviceHealth, ...]
     mission: Mission
     markers: tuple[MarkerSample, ...] = ()
+    colour: ColourFrame | None = field(default=None, compare=False)  # for the log only: neither used nor replayed

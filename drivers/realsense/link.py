@@ -12,6 +12,8 @@ from drivers.io.process import IoProcess, IoSpec
 from drivers.realsense.plan import MEMORY, CameraPlan, Figure
 from drivers.realsense.settings import CameraSettings, ImuSettings, SourceSettings
 
+STUCK_S = 3.0  # librealsense may hold the process up for so long, in finding a camera again
+
 
 class CameraLink:
     """Learns from every device what it wants, and starts the process when the first of them is opened."""
@@ -48,7 +50,7 @@ class CameraLink:
 
     def _process(self) -> IoProcess:
         session, patience_s = "drivers.realsense.session:RealSenseSession", self.plan.source.connect_s + 5.0
-        return IoProcess(IoSpec(self._name, session, self.plan, MEMORY, open_s=patience_s))
+        return IoProcess(IoSpec(self._name, session, self.plan, MEMORY, open_s=patience_s, silent_s=STUCK_S))
 
 
 def link_of(settings: CameraSettings | ImuSettings, setup: DeviceSetup) -> Lease[CameraLink]:

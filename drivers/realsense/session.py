@@ -63,10 +63,17 @@ class RealSenseSession:
         self._heard_ns: dict[str, int] = {}  # when each kind of stream was last heard
 
     def open(self) -> None:
-        """Look for the camera from now on, while it is polled; an emulation may still be on its way."""
-        self._health.state, self._health.fault = DeviceState.RECONNECTING, ""
+        """Open the camera; an emulation that may still be on its way is looked for while it is polled.
+
+        Raises:
+            DeviceError: it is not there, or has no such streams.
+        """
+        self._health.state = DeviceState.RECONNECTING
         self._began_ns = None
         self._heard_ns.clear()
+        librealsense()  # to load it takes its time, which is here
+        with device_errors(self._port.name):
+            self._find(0)
 
     def wakes_on(self) -> tuple[int, ...]:
         """Return nothing: it is polled."""

@@ -38,8 +38,8 @@ def warm_up() -> None:
 
 
 def consumed_schemas(images: bool = True) -> dict[str, Schema]:
-    """Return the columns of what the loop consumed, by the fields of `Sensed`."""
-    return {f.name: Schema(f"/replay/sensed/{f.name}", _CONSUMED[f.name], images) for f in fields(Sensed)}
+    """Return the columns of what the loop consumed, by the fields of `Sensed`; what is only looked at is not among them."""
+    return {f.name: Schema(f"/replay/sensed/{f.name}", _CONSUMED[f.name], images) for f in fields(Sensed) if f.compare}
 
 
 def decided_schemas() -> dict[str, Schema]:

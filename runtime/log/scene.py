@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from drivers.interface.geometry import SE2, SE3
 from drivers.interface.mission import Goal
-from drivers.interface.samples import Intrinsics
+from drivers.interface.samples import ColourFrame, Intrinsics
 from runtime.cycle import Cycle
 from runtime.log import arm, colours, rvl, shapes, tracks
 from runtime.log.header import RunHeader
@@ -27,6 +27,7 @@ CAMERA = f"{BASE}/camera"
 ARM = f"{BASE}/arm"
 DEPTH = "/replay/sensed/depth"  # the exact image is also the one that is shown
 DEPTH_SHOWN_M = 6.0  # the last colour
+COLOUR = "/view/colour"
 _IMAGE_FRAME = "depth_image"
 _PATH_Z_M = 0.02  # paths lie just above the grid
 
@@ -47,6 +48,7 @@ def layers(header: RunHeader, settings: LogSettings) -> list[Layer[Any]]:
         Layer(lambda c: c.belief.odom_from_base, Rows(BASE, _poses, shapes.robot(BASE, header))),
         Layer(_camera, Rows(CAMERA, _cameras), EQUAL),
         Layer(_depth_unit, Rows(DEPTH, _depth_scales, _depth_style()), EQUAL),
+        Layer(lambda c: c.sensed.colour, Rows(COLOUR, _pictures)),
         Layer(lambda c: c.belief.grid, Rows(f"{ODOM}/grid", grid_columns), IDENTICAL, often),
         Layer(lambda c: c.belief.clearance, Rows(f"{ODOM}/clearance", clearance_columns), IDENTICAL, often),
         Layer(lambda c: c.route.path_in_odom, path(f"{ODOM}/route", colours.ROUTE, 0.012), IDENTICAL, often),
@@ -108,6 +110,10 @@ def _depth_scales(units_m: list[float]) -> rr.ComponentColumnList:
         meter=[1.0 / unit for unit in units_m],
         depth_range=[(0.0, DEPTH_SHOWN_M / unit) for unit in units_m],
     )
+
+
+def _pictures(frames: list[ColourFrame]) -> rr.ComponentColumnList:
+    return rr.EncodedImage.columns(blob=[frame.jpeg for frame in frames], media_type=["image/jpeg"] * len(frames))
 
 
 def _depth_style() -> Static:

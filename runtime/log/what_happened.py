@@ -19,7 +19,7 @@ def layout(header: RunHeader) -> rrb.Horizontal:
     """Return the layout, without views of what the robot does not have."""
     rows: list[rrb.Container | rrb.View] = []
     if "camera" in header.devices:
-        rows.append(rrb.Horizontal(_depth(), _clearance()))
+        rows.append(rrb.Horizontal(rrb.Tabs(_depth(), _colour(), active_tab=0), _clearance()))
     if "base" in header.devices:
         rows.append(rrb.Horizontal(*(views.plot(f"{axis} [{_UNITS[axis]}]", f"/view/command/{axis}") for axis in plots.AXES)))
     if header.arm is not None:
@@ -46,6 +46,10 @@ def _clearance() -> rrb.Spatial3DView:
 
 def _depth() -> rrb.Spatial2DView:
     return rrb.Spatial2DView(name=f"Depth, 0 to {scene.DEPTH_SHOWN_M:g} m", origin=scene.DEPTH, background=views.BACKGROUND)
+
+
+def _colour() -> rrb.Spatial2DView:
+    return rrb.Spatial2DView(name="Colour", origin=scene.COLOUR, background=views.BACKGROUND)
 
 
 def _joints() -> rrb.TimeSeriesView:
