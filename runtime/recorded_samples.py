@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from drivers.interface.errors import ConfigurationError
-from runtime.log.exact import consumed_schemas
-from runtime.log.read import read, ticks
+from runtime.log.read import ticks
+from runtime.log.stream import rows
 
 
 def recorded_ticks(log: Path) -> tuple[int, ...]:
@@ -17,14 +16,10 @@ def recorded_ticks(log: Path) -> tuple[int, ...]:
 
 
 def recorded(log: Path, name: str, at: Sequence[int] | None = None) -> tuple[Any, ...]:
-    """Return a field of `Sensed` at ticks of a recording (None: at every one), as it was; the other fields are not read.
+    """Return a field of `Sensed` at ticks of a recording (None: at every one), as it was; the other fields may be missing.
 
     Raises:
         ConfigurationError: the file is not a recording of ours, damaged, or does not hold the field.
     """
-    schema = consumed_schemas()[name]
-    held = read(log, schema.entity)
-    try:
-        return tuple(schema.take(held.at(schema.entity, tick)) for tick in (recorded_ticks(log) if at is None else at))
-    except ValueError as error:
-        raise ConfigurationError(f"the log {log} does not hold '{name}': {error}") from error
+    found = {row.tick: row.consumed(name) for row in rows(log) if at is None or row.tick in at}
+    return tuple(found[tick] for tick in (found if at is None else at))

@@ -21,8 +21,9 @@ from runtime.keyframes import KeyFrame
 from runtime.log import rvl
 from runtime.log.checksum import Cells, checksums
 from runtime.log.columns import IMAGE_COMPONENT
-from runtime.log.exact import CHECK, consumed_schemas, decided_schemas
+from runtime.log.exact import CHECK, CONSUMED, DECIDED, consumed_schemas, decided_schemas
 from runtime.log.keyframes import KEY_FRAME, key_frame_of
+from runtime.log.packing import Layout, Share, unpack
 from runtime.log.schema import Schema
 
 IMAGE = str(IMAGE_COMPONENT.component)
@@ -77,8 +78,11 @@ class _Checked:
 class Block:
     """Ticks in their order, and what the log holds of each."""
 
-    def __init__(self, columns: Mapping[str, Piece], images: Mapping[str, Piece], ahead: Executor) -> None:
+    def __init__(
+        self, columns: Mapping[str, Piece], images: Mapping[str, Piece], layouts: Mapping[int, Layout], ahead: Executor
+    ) -> None:
         """Take the columns of each entity, and its coded images; these are decoded and checksums compared in `ahead`."""
+        self._layouts = layouts
         self._numbers = np.unique(columns[CHECK].ticks)
         self.ticks: list[int] = self._numbers.tolist()
         self._columns, self._images = columns, images
@@ -93,8 +97,22 @@ class Block:
     def values(self, entity: str) -> dict[str, Values]:
         """Return the columns of an entity by name, without the images."""
         if entity not in self._values:
-            self._values[entity] = self._fitted(self._columns[entity]) if entity in self._columns else {}
+            if entity in _members():
+                self._unpack(_members()[entity])
+            else:
+                self._values[entity] = self._fitted(self._columns[entity]) if entity in self._columns else {}
         return self._values[entity]
+
+    def _unpack(self, entity: str) -> None:
+        """Take the columns out of the packed ones; those that do not fit are none."""
+        packed = {name: Share(column.values, column.ends) for name, column in self.values(entity).items()}
+        try:
+            entities = unpack(packed, self._layouts)
+        except ValueError:
+            entities = {}
+        for member in (member for member, whole in _members().items() if whole == entity):
+            shares = entities.get(member, {})
+            self._values[member] = {name: Values(_frozen(share.values), share.ends) for name, share in shares.items()}
 
     def cells(self, entity: str, index: int) -> dict[str, Any]:
         """Return a tick's values of an entity by the names of their columns; those without any are left out."""
@@ -126,16 +144,13 @@ class Block:
         return {name: _values(column, shares) for name, column in piece.columns.items()}
 
     def _check(self) -> _Checked:
-        cells: list[Cells] = []
+        cells = [Cells(name, column.values, column.ends) for name, column in self.values(CONSUMED).items()]
         images: dict[str, Values] = {}
         sound = np.ones(len(self.ticks), np.bool_)
-        for entity in (schema.entity for schema in consumed().values()):
-            columns = self.values(entity)
-            if entity in self._images:
-                images[entity], whole = _decoded(self._fitted(self._images[entity])[IMAGE])
-                sound &= whole
-                columns = columns | {_IMAGE_COLUMN: images[entity]}
-            cells += [Cells(f"{entity} {name}", column.values, column.ends) for name, column in columns.items()]
+        for entity in self._images:
+            images[entity], whole = _decoded(self._fitted(self._images[entity])[IMAGE])
+            sound &= whole
+            cells.append(Cells(f"{entity} {_IMAGE_COLUMN}", images[entity].values, images[entity].ends))
         crc = self.values(CHECK).get("crc32")
         said = [list(crc.at(index)) if crc is not None else [] for index in range(len(self.ticks))]
         sound &= [[own] == recorded for own, recorded in zip(checksums(cells, len(self.ticks)), said, strict=True)]
@@ -165,6 +180,18 @@ class Row:
             return self.block.sensed(self.index)
         except ValueError as error:
             raise ConfigurationError(f"tick {self.tick} of the log cannot be replayed: {error}") from error
+
+    def consumed(self, name: str) -> Any:
+        """Return one field of what the loop consumed; the others need not be there.
+
+        Raises:
+            ConfigurationError: the log does not hold all of it.
+        """
+        schema = consumed()[name]
+        try:
+            return schema.take(self.cells(schema.entity))
+        except ValueError as error:
+            raise ConfigurationError(f"tick {self.tick} of the log does not hold '{name}': {error}") from error
 
     @property
     def has_key_frame(self) -> bool:
@@ -232,6 +259,16 @@ def consumed() -> dict[str, Schema]:
 def decided() -> dict[str, Schema]:
     """Return the columns of what the loop decided, by the fields of `Cycle`."""
     return decided_schemas()
+
+
+@cache
+def _members() -> dict[str, str]:
+    """Return by entity the one that it is packed in."""
+    return {s.entity: CONSUMED for s in consumed().values()} | {s.entity: DECIDED for s in decided().values()}
+
+
+def _frozen(values: Any) -> Any:
+    return frozen_array(values) if isinstance(values, np.ndarray) else values
 
 
 def _values(column: pa.Array, shares: NDArray[np.int64]) -> Values:

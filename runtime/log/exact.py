@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
-from typing import Any, NamedTuple, get_type_hints
+from typing import NamedTuple, get_type_hints
 
 import numpy as np
-import pyarrow as pa
-from numpy.typing import NDArray
 
 from drivers.interface.sensed import Sensed
 from runtime.cycle import Cycle
 from runtime.log import checksum, rvl
 from runtime.log.checksum import Cells, checksums
 from runtime.log.columns import ArrowColumn, Column, Kind
+from runtime.log.packing import Layout, Named, pack
 from runtime.log.schema import Schema
 
 
@@ -27,6 +26,8 @@ class Batch(NamedTuple):
 
 
 CHECK = "/replay/check"
+CONSUMED = "/replay/sensed"  # packed columns
+DECIDED = "/replay/decided"
 _CONSUMED = get_type_hints(Sensed)
 _DECIDED = {name: hint for name, hint in get_type_hints(Cycle).items() if name not in {"sensed", "stage_ns"}}
 
@@ -55,6 +56,8 @@ class ExactPart:
         self._consumed = consumed_schemas(images)
         self._decided = decided_schemas()
         self._lost: list[int] = []
+        self._layouts: dict[int, Layout] = {}
+        self._new_layouts: list[Layout] = []
 
     def put(self, cycle: Cycle, lost_before: int) -> None:
         """Add a tick, after `lost_before` ticks that could not be recorded."""
@@ -66,19 +69,25 @@ class ExactPart:
 
     def batches(self) -> Iterator[Batch]:
         """Yield all columns of the ticks since the last call and start anew."""
-        cells: list[Cells] = []
-        for schema in self._consumed.values():
-            arrays = [(column, column.flat()) for column in schema.columns.values() if column.values]
-            cells += [Cells(f"{schema.entity} {c.name}", _comparable(c, flat), c.ends) for c, flat in arrays]
-            yield Batch(schema.entity, [c.finished(flat) for c, flat in arrays if c.kind is not Kind.IMAGE])
-            for column, flat in arrays:
-                if column.kind is Kind.IMAGE:  # no row where there is none: an empty one would blank the viewer
-                    rows = np.flatnonzero(np.diff(column.ends, prepend=0)).tolist()
-                    yield Batch(schema.entity, [column.finished(flat, list(range(1, len(rows) + 1)))], rows)
+        consumed, decided = pack(_named(self._consumed)), pack(_named(self._decided))
+        for layout in (consumed.layout, decided.layout):
+            if layout.key not in self._layouts:
+                self._layouts[layout.key] = layout
+                self._new_layouts.append(layout)
+        images = [(s.entity, c) for s in self._consumed.values() for c in s.columns.values() if c.kind is Kind.IMAGE and c.values]
+        cells = [*consumed.cells(), *(Cells(f"{entity} {c.name}", c.values, c.ends) for entity, c in images)]
+        yield Batch(CONSUMED, consumed.finished())
+        for entity, column in images:  # no row where there is none: an empty one would blank the viewer
+            rows = np.flatnonzero(np.diff(column.ends, prepend=0)).tolist()
+            yield Batch(entity, [column.finished(column.flat(), list(range(1, len(rows) + 1)))], rows)
         yield Batch(CHECK, [_single("crc32", checksums(cells, len(self._lost))), _single("lost_before", self._lost)])
-        for schema in self._decided.values():
-            yield Batch(schema.entity, [c.finished(c.flat()) for c in schema.columns.values() if c.values])
+        yield Batch(DECIDED, decided.finished())
         self._clear()
+
+    def new_layouts(self) -> list[Layout]:
+        """Return the layouts that were first used since the last call: a file needs them before the columns."""
+        new, self._new_layouts = self._new_layouts, []
+        return new
 
     def _clear(self) -> None:
         self._lost.clear()
@@ -86,11 +95,9 @@ class ExactPart:
             schema.clear()
 
 
-def _comparable(column: Column, flat: pa.Array) -> Sequence[Any] | NDArray[Any]:
-    """Return the values as the checksum reads them: what the loop used, before any encoding."""
-    if column.kind in {Kind.TEXT, Kind.IMAGE}:
-        return column.values
-    return np.asarray(flat.to_numpy(zero_copy_only=False))
+def _named(schemas: Mapping[str, Schema]) -> list[Named]:
+    """Return the columns that are packed: all but the images."""
+    return [Named(s.entity, column) for s in schemas.values() for column in s.columns.values() if column.kind is not Kind.IMAGE]
 
 
 def _single(name: str, values: Sequence[int]) -> ArrowColumn:

@@ -12,11 +12,13 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from rerun.chunk import Chunk
 
+from drivers.interface.errors import ConfigurationError
 from runtime.log import rvl
 from runtime.log.columns import IMAGE_COMPONENT
 from runtime.log.events import EVENTS
-from runtime.log.exact import CHECK
+from runtime.log.exact import CHECK, CONSUMED, DECIDED
 from runtime.log.opening import chunks, chunks_of_file
+from runtime.log.packing import LAYOUTS, Layout, layout_of, share_of, unpack
 
 _NOT_CONTENT = ("/timing", "/run")
 STATIC = -1  # stands for the tick of what holds for the whole run
@@ -50,7 +52,7 @@ class Log:
 
 
 def read(path: Path, content: str = "/**") -> Log:
-    """Read a log, or all its files, or only the entities that match `content`.
+    """Read a log, or all its files, or only the entities that match `content`; packed columns only with all of /replay.
 
     Raises:
         ConfigurationError: a file is missing, empty, cut, or not a log of ours.
@@ -69,14 +71,51 @@ def read_file(file: Path, content: str) -> Log:
 
 def _gathered(path: Path, pieces: Iterable[Chunk]) -> Log:
     entities: dict[str, dict[str, dict[int, Cell]]] = {}
+    packed: list[pa.RecordBatch] = []
+    layouts: dict[int, Layout] = {}
     for chunk in pieces:
         batch = chunk.to_record_batch()
-        times = next((c.to_pylist() for name, c in _columns(batch, b"index") if name == "tick"), [STATIC] * batch.num_rows)
+        if chunk.entity_path in {CONSUMED, DECIDED}:
+            packed.append(batch)
+            continue
+        if chunk.entity_path.startswith(LAYOUTS):
+            layout = layout_of(tuple(batch.column("columns")[0].as_py()))
+            layouts[layout.key] = layout
+            continue
+        times = _times(batch)
         for name, column in _columns(batch, b"data"):
-            held = entities.setdefault(chunk.entity_path, {}).setdefault(name, {})
-            for tick, cell in _cells(times, column):
-                held[tick] = _joined(held[tick], cell) if tick in held and tick != STATIC else cell
+            _hold(entities, chunk.entity_path, name, _cells(times, column))
+    for batch in packed if layouts else ():
+        for entity, name, cells in _unpacked(batch, layouts):
+            _hold(entities, entity, name, cells)
     return Log(path, {entity: _ordered(entities[entity]) for entity in sorted(entities)})
+
+
+def _hold(entities: dict[str, dict[str, dict[int, Cell]]], entity: str, name: str, cells: Iterable[tuple[int, Cell]]) -> None:
+    held = entities.setdefault(entity, {}).setdefault(name, {})
+    for tick, cell in cells:
+        held[tick] = _joined(held[tick], cell) if tick in held and tick != STATIC else cell
+
+
+def _times(batch: pa.RecordBatch) -> list[int]:
+    return next((c.to_pylist() for name, c in _columns(batch, b"index") if name == "tick"), [STATIC] * batch.num_rows)
+
+
+def _unpacked(batch: pa.RecordBatch, layouts: Mapping[int, Layout]) -> Iterator[tuple[str, str, Iterator[tuple[int, Cell]]]]:
+    """Yield the columns that a packed chunk holds: the entity and name of each, and its cells.
+
+    Raises:
+        ConfigurationError: they do not fit each other.
+    """
+    times = _times(batch)
+    wide = {name: share_of(column) for name, column in _columns(batch, b"data")}
+    try:
+        entities = unpack(wide, layouts)
+    except ValueError as error:
+        raise ConfigurationError(f"the log is damaged between the ticks {times[0]} and {times[-1]}: {error}") from error
+    for entity, columns in entities.items():
+        for name, share in columns.items():
+            yield entity, name, ((tick, cell) for row, tick in enumerate(times) if len(cell := share.at(row)))
 
 
 def ticks(path: Path) -> list[int]:

@@ -11,13 +11,14 @@ import numpy as np
 import pyarrow as pa
 
 from drivers.interface.errors import ConfigurationError
-from runtime.log.block import IMAGE, Block, Piece, Row, consumed, decided
-from runtime.log.exact import CHECK
+from runtime.log.block import IMAGE, Block, Piece, Row
+from runtime.log.exact import CHECK, CONSUMED, DECIDED
 from runtime.log.keyframes import KEY_FRAME
 from runtime.log.opening import chunks
+from runtime.log.packing import LAYOUTS, Layout, layout_of
 
 AHEAD = 100  # ticks that are read before the first of them is given out
-_ALWAYS = frozenset({CHECK, *(schema.entity for schema in (*consumed().values(), *decided().values()))})
+_ALWAYS = (CHECK, CONSUMED, DECIDED)
 
 
 def rows(path: Path) -> Iterator[Row]:
@@ -45,10 +46,15 @@ class _Gathering:
     def __init__(self) -> None:
         self._pieces: dict[tuple[str, bool], list[Piece]] = {}  # by entity; images are apart, as not all ticks have one
         self._reached = dict.fromkeys(_ALWAYS, -1)  # the last tick of each entity that has one every tick
+        self._layouts: dict[int, Layout] = {}
         self._given = -1
 
     def add(self, entity: str, batch: pa.RecordBatch) -> None:
         """Add a chunk."""
+        if entity.startswith(LAYOUTS):
+            layout = layout_of(tuple(batch.column("columns")[0].as_py()))
+            self._layouts[layout.key] = layout
+            return
         piece, images = _pieces(entity, batch)
         for some in (piece, images):
             if not some.columns or not some.ticks.size:
@@ -71,6 +77,7 @@ class _Gathering:
         return Block(
             {entity: piece for (entity, images), piece in taken.items() if not images},
             {entity: piece for (entity, images), piece in taken.items() if images},
+            self._layouts,
             ahead,
         )
 
@@ -94,8 +101,8 @@ def _pieces(entity: str, batch: pa.RecordBatch) -> tuple[Piece, Piece]:
         name, kind = field.name, (field.metadata or {}).get(b"rerun:kind")
         if kind == b"index" and name == "tick":
             ticks = column.to_numpy()
-        elif kind == b"data" and name == IMAGE and entity in _ALWAYS:
+        elif kind == b"data" and name == IMAGE:
             images[name] = column
-        elif kind == b"data" and (entity in {CHECK, KEY_FRAME} or (entity in _ALWAYS and ":" not in name)):
+        elif kind == b"data" and entity in {*_ALWAYS, KEY_FRAME}:
             columns[name] = column
     return Piece(ticks, columns), Piece(ticks, images)

@@ -6,10 +6,10 @@ from functools import cache
 
 from drivers.interface.errors import ConfigurationError
 from drivers.interface.sensed import Sensed
-from runtime.log.checksum import Cells, checksums
-from runtime.log.exact import CHECK, consumed_schemas
+from runtime.log.exact import consumed_schemas
 from runtime.log.read import Log
 from runtime.log.schema import Schema
+from runtime.log.stream import rows
 
 
 def sensed_at(log: Log, tick: int) -> Sensed:
@@ -27,17 +27,9 @@ def sensed_at(log: Log, tick: int) -> Sensed:
 
 def damaged_ticks(log: Log) -> list[int]:
     """Return the ticks whose checksum does not fit what the log holds of them."""
-    return [tick for tick, crc in log.history(CHECK, "crc32").items() if int(crc[0]) != _checksum(log, tick)]
+    return [row.tick for row in rows(log.path) if not row.is_sound]
 
 
 @cache
 def _schemas() -> dict[str, Schema]:
     return consumed_schemas()
-
-
-def _checksum(log: Log, tick: int) -> int:
-    cells: list[Cells] = []
-    for schema in _schemas().values():
-        row = log.at(schema.entity, tick)
-        cells += [Cells(f"{schema.entity} {name}", row[name], [len(row[name])]) for name in schema.columns if name in row]
-    return checksums(cells, 1)[0]

@@ -21,6 +21,7 @@ from runtime.log.layout import layout
 from runtime.log.live import LiveView
 from runtime.log.marks import END, SEGMENT, End, Segment
 from runtime.log.opening import RUN
+from runtime.log.packing import Layout
 from runtime.log.settings import LogSettings
 from runtime.log.sink import Sink
 
@@ -57,6 +58,7 @@ class Writer:
             OSError: the file cannot be created.
         """
         self._sink = Sink(path, live, blueprint or layout(header), settings.flush_interval_s, segment.recording_id)
+        self._flush_interval_s = settings.flush_interval_s
         self._put_ticks = 0
         self._exact = ExactPart(settings.depth)
         self._key_frames = KeyFramePart()
@@ -116,7 +118,9 @@ class Writer:
         """Send the batch and start a new one; what is drawn goes out less often, as a batch costs much and a row little."""
         if not self._ticks:
             return
-        for batch in (*self._key_frames.batches(), *self._exact.batches()):  # built as a whole before any of it is sent
+        batches = (*self._key_frames.batches(), *self._exact.batches())  # built as a whole before any of it is sent
+        self._announce(self._exact.new_layouts())
+        for batch in batches:
             self._sink.send(batch.entity, self._index(batch.rows or range(len(self._ticks))), batch.columns)
         now_ns = self._starts_ns[-1]
         self._ticks.clear()
@@ -124,6 +128,12 @@ class Writer:
         if now_ns >= self._draw_due_ns:
             self._draw_due_ns = now_ns + self._draw_interval_ns
             self.send_drawn()
+
+    def _announce(self, layouts: Sequence[Layout]) -> None:
+        for each in layouts:
+            self._sink.log_static(each.entity, each.as_components())
+        if layouts:
+            self._sink.flush(self._flush_interval_s)  # what is logged waits in Rerun, columns do not
 
     def send_drawn(self) -> None:
         """Send what waits to be drawn."""

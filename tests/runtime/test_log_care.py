@@ -38,7 +38,7 @@ def test_a_whole_log_is_described_verified_and_cut(tmp_path: Path, capsys: pytes
     record(tmp_path / "a.rrd", CYCLES, batch_ticks=7)
     code, said, _ = trundle(capsys, "log", "info", tmp_path / "a.rrd")
     assert code == 0
-    for words in ("hallway, dwa, seed 3", "60: 0 to 59, 3.0 s", "schema 1", "tick 30 fault: silent_device of camera"):
+    for words in ("hallway, dwa, seed 3", "60: 0 to 59, 3.0 s", "schema 2", "tick 30 fault: silent_device of camera"):
         assert words in said
     assert trundle(capsys, "log", "verify", tmp_path / "a.rrd")[0] == 0
     code, said, _ = trundle(capsys, "log", "cut", tmp_path / "a.rrd", "--around", 40, "--seconds", 0.5)
@@ -119,7 +119,7 @@ def test_a_log_of_another_schema_is_refused(
     for verb in ("info", "verify"):
         code, _, complaint = trundle(capsys, "log", verb, tmp_path / "a.rrd")
         assert code == 2
-        assert "has schema 99; this version of trundle reads 1" in complaint
+        assert "has schema 99; this version of trundle reads 2" in complaint
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
