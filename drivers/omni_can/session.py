@@ -223,8 +223,9 @@ class OmniCanSession:
     def _tell(self) -> None:
         s, health = self._settings, self._health
         health.bus_load = self._axes.load.load
-        voltage_v = min(axis.voltage_v for axis in self._axes.each)
-        if math.isfinite(voltage_v):
+        voltages_v = sorted(axis.voltage_v for axis in self._axes.each if math.isfinite(axis.voltage_v))
+        if voltages_v:  # of one battery: the median, so that one damaged frame does not stop the robot
+            voltage_v = voltages_v[len(voltages_v) // 2]
             health.battery_v = voltage_v
             share = (voltage_v - s.battery_empty_v) / (s.battery_full_v - s.battery_empty_v)
             health.battery_fraction = min(max(share, 0.0), 1.0)

@@ -61,7 +61,7 @@ class OmniCanSettings(Settings):
     connect_s: float = Field(default=2.0, gt=0.1, le=30.0, description="until every axis must have been heard")
     silent_s: float = Field(default=0.3, gt=0.02, le=10.0, description="without an axis's frames for so long the wire is lost")
     brake_s: float = Field(default=0.5, ge=0.0, le=5.0, description="for how long zero is repeated after the last command")
-    gather_s: float = Field(default=0.005, ge=0.0, le=0.02, description="frames that come so close together are read together")
+    gather_s: float = Field(default=0.01, ge=0.0, le=0.02, description="frames that come so close together are read together")
 
     wheel_radius_m: float = Field(default=0.05, gt=0.01, le=0.5, description="of every wheel")
     wheel_distance_m: float = Field(default=0.10, gt=0.02, le=2.0, description="from the centre to each wheel")

@@ -35,6 +35,7 @@ HERE = Path(__file__).parent
 HANGS_S = 300.0  # a case that takes longer ends the campaign with a traceback
 SETTLED_S = 0.5  # after a fault its answer may still come
 OUR_OWN = {"loop", "planner"}  # a machine that is too slow is no device's fault
+TOO_SLOW = 0.02  # of the deadlines missed
 AT_REST = 1e-3  # m/s or rad/s
 
 
@@ -156,6 +157,8 @@ def _wrong(answers: list[str], watch: Watch, result: RunResult, log: Path) -> st
         wrong.append("the recording is not whole")
     if given in {"stand_down", "latch"} and watch.zero_s is None:
         wrong.append("zero was never sent")
+    if wrong and result.report.missed_deadlines > TOO_SLOW * result.report.ticks:
+        wrong.append(f"but the machine was too slow: {result.report.missed_deadlines} deadlines of {result.report.ticks} missed")
     return "; ".join(wrong)
 
 

@@ -272,7 +272,7 @@ def test_the_same_position_again_and_again_of_a_turning_wheel_is_no_news():
 
 def test_battery_and_temperature_are_told():
     driven = ready(battery_empty_v=20.0, battery_full_v=25.0)
-    for node, voltage in zip(NODES, (24.0, 23.0, 24.0), strict=True):
+    for node, voltage in zip(NODES, (24.0, 23.0, 0.5), strict=True):  # of one battery; the last one is damaged
         driven.bus.put(node << 5 | 0x17, np.array([voltage, 0.5], "<f4").tobytes())
         driven.bus.put(node << 5 | 0x15, np.array([40.0, 30.0], "<f4").tobytes())
     driven.poll()
