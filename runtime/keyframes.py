@@ -54,6 +54,7 @@ class KeyFrames:
 
     def __init__(self, parts: Parts, interval_s: float) -> None:
         """Begin with the first interval; the first tick needs none."""
+        self.fault = ""  # why no more are taken: a part that cannot say what it goes on from
         self._parts = parts
         self._interval_ns = round(interval_s * SECOND_NS)
         self._due_ns: int | None = None
@@ -64,18 +65,26 @@ class KeyFrames:
         frame, now_ns = self._finished(cycle), cycle.sensed.tick.start_ns
         if frame is not None or self._due_ns is None:
             self._due_ns = now_ns + self._interval_ns
-        if now_ns >= self._due_ns and self._parts.runner.is_idle_at(cycle.sensed.tick.index + 1):
+        if now_ns >= self._due_ns and not self.fault and self._parts.runner.is_idle_at(cycle.sensed.tick.index + 1):
             self._begin()
         return frame
 
     def _begin(self) -> None:
         parts = self._parts
-        self._begun = _Begun(parts.estimator.snapshot(), parts.router.snapshot(), parts.shield.snapshot(), parts.supervisor.state)
+        taken = {}
+        for name in ("estimator", "router", "shield"):
+            try:
+                taken[name] = getattr(parts, name).snapshot()
+            except Exception as error:  # noqa: BLE001 - a part is anyone's code; its failure costs key frames, not the run
+                self.fault = f"no more key frames: the {name}'s snapshot raised {type(error).__name__}: {error}"
+                return
+        self._begun = _Begun(**taken, supervisor=parts.supervisor.state)
         parts.runner.ask_checkpoint()
 
     def _finished(self, cycle: Cycle) -> KeyFrame | None:
         """Return the key frame; none where the tick also rested on what no part keeps as its state."""
         begun, checkpoint, self._begun = self._begun, self._parts.runner.checkpoint, None
+        self.fault = self.fault or self._parts.runner.checkpoint_fault
         if begun is None or checkpoint is None or any(report.fault in _CARRIED_OVER for report in cycle.verdict.faults):
             return None
         state = KeyState(begun.supervisor, checkpoint.state)

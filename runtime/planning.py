@@ -64,6 +64,7 @@ class PlannerRunner:
         self._background = Background[Plan]("planner") if latency_ticks else None
         self._asked = False
         self.checkpoint: Checkpoint | None = None  # taken at the last `plan` that came after `ask_checkpoint`
+        self.checkpoint_fault = ""  # why there is none: the planner's snapshot raised
 
     def plan(self, belief: Belief, route: Route) -> Plan:
         """Return the plan in force at this tick."""
@@ -104,7 +105,11 @@ class PlannerRunner:
         """Return what to go on from; None while a plan is in the making."""
         if self._pending is not None:
             return None
-        return Checkpoint(self.state, self._planner.snapshot())
+        try:
+            return Checkpoint(self.state, self._planner.snapshot())
+        except Exception as error:  # noqa: BLE001 - a planner is anyone's code; its failure costs key frames, not the run
+            self.checkpoint_fault = f"no more key frames: the planner's snapshot raised {type(error).__name__}: {error}"
+            return None
 
     def _collect(self, tick: int) -> None:
         if self._pending is None or tick < self._pending[0]:

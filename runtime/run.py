@@ -186,6 +186,8 @@ def recording(recorder: Recorder, key_frames: KeyFrames | None, board: FaultBoar
         sentence = recorder.fault()
         if sentence:
             board.post(FaultReport(unwritable, "recorder", sentence), given=True)
+        elif key_frames is not None and key_frames.fault:  # the log is written, and replays from its first tick only
+            board.post(FaultReport(Fault.LOG_UNWRITABLE, "recorder", key_frames.fault), given=True)
 
     return record
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from drivers.interface.errors import ConfigurationError
+from planners.dwa.planner import DynamicWindow
 from planners.planner import Plan
 from runtime import configuration, registry, run
 from runtime.cli import run_command
@@ -15,6 +16,8 @@ from runtime.log.stream import rows
 from runtime.registry import Part
 from runtime.replay.replay import ReplayOptions, replay
 from runtime.replay.stretches import Stretches
+from tests.runtime.log_cycles import make_cycles
+from tests.runtime.test_log_recorder import record as record_cycles
 
 OF_AN_ARM = ("joint_waypoints",)
 
@@ -32,15 +35,13 @@ def hallway(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("planner", [name for name in registry.names(Part.PLANNER) if name not in OF_AN_ARM])
-def test_every_planner_comes_to_the_same_also_in_the_background(planner: str, tmp_path: Path) -> None:
-    changes = (f"planner={{name: {planner}}}", "planner.latency_ticks=2", "planner.period_ticks=3")
-    for name, some in (("a", changes[:1]), ("b", changes)):
-        log = record(tmp_path / f"{name}.rrd", "dynamic_hallway", *some)
-        assert replay(log, ReplayOptions()).sentences() == ["identical: 41 ticks"]
-        part = replay(log, ReplayOptions(first=30, last=35))
-        assert part.identical
-        assert 15 < part.beginnings[0] <= 30
-        assert part.ticks == 36 - part.beginnings[0]
+def test_every_planner_comes_to_the_same(planner: str, tmp_path: Path) -> None:
+    log = record(tmp_path / "a.rrd", "dynamic_hallway", f"planner={{name: {planner}}}", seconds=1.5)
+    assert replay(log, ReplayOptions()).sentences() == ["identical: 31 ticks"]
+    part = replay(log, ReplayOptions(first=25, last=28))
+    assert part.identical
+    assert 10 < part.beginnings[0] <= 25
+    assert part.ticks == 29 - part.beginnings[0]
 
 
 @pytest.mark.parametrize(
@@ -49,6 +50,7 @@ def test_every_planner_comes_to_the_same_also_in_the_background(planner: str, tm
         ("static_corridor", ("robot=jackal",)),
         ("door", ("estimator.memory.kind=layers", "estimator.tracks=grid", "estimator.odometry.kind=ekf")),
         ("door", ("estimator.odometry.kind=dead_reckoning",)),
+        ("dynamic_hallway", ("planner.latency_ticks=2", "planner.period_ticks=3")),
         ("arm_bench", ()),
         ("arm_waypoints", ()),
         ("static_corridor", ("loop.work_ms=70", "loop.plan_ms=65")),
@@ -115,6 +117,30 @@ def test_a_tick_that_is_missing_ends_a_stretch_and_the_next_key_frame_begins_one
 def test_what_cannot_be_replayed_is_refused_in_a_sentence(hallway: Path, options: ReplayOptions, said: str) -> None:
     with pytest.raises(ConfigurationError, match=said):
         replay(hallway, options)
+
+
+def test_a_part_that_cannot_say_its_state_costs_the_key_frames_and_not_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def raising(self: DynamicWindow) -> bytes:
+        raise RuntimeError("no state")
+
+    monkeypatch.setattr(DynamicWindow, "snapshot", raising)
+    log = record(tmp_path / "a.rrd", "dynamic_hallway")
+    assert not any(row.has_key_frame for row in rows(log))
+    said = [report.detail for row in rows(log) for report in row.given]
+    assert set(said) == {"no more key frames: the planner's snapshot raised RuntimeError: no state"}
+    assert replay(log, ReplayOptions()).sentences() == ["identical: 41 ticks"]
+    assert replay(log, ReplayOptions(first=30)).beginnings == (0,)
+
+
+def test_a_log_of_an_older_schema_is_refused_in_a_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("runtime.log.writer.SCHEMA_VERSION", 1)
+    record_cycles(tmp_path / "a.rrd", make_cycles(2))
+    assert run_command(["replay", str(tmp_path / "a.rrd")]) == 2
+    assert "has schema 1; this version of trundle reads" in " ".join(capsys.readouterr().err.split())
 
 
 def test_no_log_an_empty_one_and_a_foreign_one_are_refused(tmp_path: Path) -> None:
