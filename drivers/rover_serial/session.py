@@ -366,8 +366,8 @@ class RoverSession:
             health.battery_v = vehicle.battery_v
         if vehicle.battery_fraction is not None:
             health.battery_fraction = vehicle.battery_fraction
-        bytes_s = self._settings.place.bytes_s
         if now_ns - self._load_ns >= LOAD_NS:
+            bytes_s = self._settings.place.bytes_s
             if bytes_s is not None:
                 health.bus_load = self._bytes / (bytes_s * (now_ns - self._load_ns) * 1e-9)
             self._bytes, self._load_ns = 0, now_ns

@@ -42,7 +42,7 @@ class RoverSettings(Settings):
     arm_s: float = Field(default=5.0, gt=0.1, le=120.0, description="for how long arming is tried again after a refusal")
     silent_s: float = Field(default=1.0, gt=0.05, le=30.0, description="without odometry for so long the wire is lost")
     brake_s: float = Field(default=2.0, ge=0.1, le=30.0, description="for how long zero is repeated before it is disarmed")
-    gather_s: float = Field(default=0.004, ge=0.0, le=0.02, description="bytes that come so close together are read together")
+    gather_s: float = Field(default=0.01, ge=0.0, le=0.05, description="bytes that come so close together are read together")
     heading_gain_per_s: float = Field(default=5.0, gt=0.1, le=50.0, description="PX4 only: its RO_YAW_P")
 
     wheel_radius_m: float = Field(default=0.098, gt=0.01, le=1.0, description="of every wheel")
