@@ -45,11 +45,17 @@ def emulated_truth() -> Rig:
     return Rig({"port": free_port()}, hasty={"open_timeout_s": 0.3})
 
 
+def realsense() -> Rig:
+    return Rig({"source": "emulated", "memory": f"contract-{free_port()}"}, hasty={"connect_s": 0.3})
+
+
 RIGS: dict[str, Callable[[], Rig]] = {  # by the driver's name
     "omni_can": omni_can,
     "rover_serial": rover_serial,
     "rover_imu": rover_imu,
     "emulated_truth": emulated_truth,
+    "realsense": realsense,
+    "realsense_imu": realsense,
 }
 
 

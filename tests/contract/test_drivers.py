@@ -139,7 +139,7 @@ def test_samples_are_stamped_in_order(tested):
     assert stamps
     assert all(a.captured_ns < b.captured_ns for a, b in pairwise(stamps))
     assert all(a.sequence < b.sequence for a, b in pairwise(stamps))
-    assert {s.clock for s in stamps} == {"host"}
+    assert len({s.clock for s in stamps}) == 1
 
 
 def test_samples_own_their_arrays(tested):
