@@ -19,7 +19,8 @@ DRIVEN = replace(
     jerk_rad_s3=0.85 * PANDA.jerk_rad_s3,
 )
 NEVER_NS = 1 << 62  # an order's end is the last hop's business
-SAME_RAD, SAME_RAD_S, SAME_RAD_S2 = 1e-5, 1e-4, 1e-2  # beyond 32-bit rounding
+# What is nearer than this is the same but for 32-bit rounding, and goes into the jerk's margin; a lost command shows as more.
+SAME_RAD, SAME_RAD_S, SAME_RAD_S2 = 4e-7, 3e-4, 0.3
 STANDS_MS = 500  # a motion ends when the set point has stood for so long without a trajectory
 DRIFT = 2e-3  # by which the controller's clock may seem to run slower, its world standing still at times included
 JUMP_NS = 100_000_000

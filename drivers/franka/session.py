@@ -110,10 +110,11 @@ class FrankaSession:
         assert self._client is not None
         try:
             state = self._client.read()
-            self._deliver(state)
-            if self._exchange is not None:
+            arrived_ns = self._clock()
+            if self._exchange is not None:  # first of all: the answer is due within the millisecond
                 self._answer(self._client, self._exchange, state)
-            else:
+            self._deliver(state, arrived_ns)
+            if self._exchange is None:
                 self._judge(state)
         except MotionAbortedError as aborted:
             self._abort(str(aborted))
@@ -215,9 +216,8 @@ class FrankaSession:
         self._phase = Phase.FAULTED
         self._health.state, self._health.fault = DeviceState.FAULTED, f"{self._port.name}: {fault}"
 
-    def _deliver(self, state: ArmState) -> None:
+    def _deliver(self, state: ArmState, now_ns: int) -> None:
         """Keep time, count, and hand every so many milliseconds a believed state to the loop."""
-        now_ns = self._clock()
         last, self._last = self._last, state
         self._robot_clock.update(state.robot_ns, now_ns)
         self._health.received += 1

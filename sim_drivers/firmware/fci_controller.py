@@ -57,7 +57,7 @@ class FciController:
     Settings: ClassVar[type[Settings]] = FciControllerSettings
     max_step_s = 0.001
     period_ns = CYCLE_NS
-    catch_up_ns: ClassVar[int] = 5 * CYCLE_NS  # what comes in a burst cannot be answered, and 20 lost answers abort a motion
+    catch_up_ns: ClassVar[int] = 3 * CYCLE_NS // 2  # a client needs its time to answer: no two cycles come close together
 
     def __init__(self, driver_settings: FciWire, settings: FciControllerSettings, setup: FirmwareSetup) -> None:
         """Join the world."""

@@ -52,6 +52,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
         "path": DATA / "realsense_depth", "rate_hz": 30.0, "fx_px": 390.0, "fy_px": 390.0, "cx_px": 320.0, "cy_px": 240.0,
         "loop": True,
     },
+    "franka": {"host": "127.66.13.37"},  # on which nobody listens: refused at once, not after a time-out
     "recorded_wheels": {"path": DATA / "diff_drive" / "input_excerpt.txt"},
 }  # fmt: skip
 ROLE = {
