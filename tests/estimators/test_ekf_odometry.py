@@ -1,6 +1,7 @@
 """The Kalman filter of the odometry: closed loops, order of arrival, slip, bad input, divergence, absolute poses."""
 
 import math
+from collections import defaultdict
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
@@ -82,11 +83,12 @@ def square(omni=True, bias=0.01, noise=0.002):
 
 def feed(odometry, imu, base, end_ns, start_ns=0):
     """Hand the samples over tick by tick, each in the tick after its arrival; return all estimates."""
-    estimates = []
-    for tick_ns in range(start_ns, end_ns + TICK_NS, TICK_NS):
-        due = [[s for s in samples if tick_ns - TICK_NS < s.stamp.received_ns <= tick_ns] for samples in (imu, base)]
-        estimates.append(odometry.update(sensed(tick_ns, imu=due[0], base=due[1])))
-    return estimates
+    due = defaultdict(lambda: ([], []))
+    for kind, samples in enumerate((imu, base)):
+        for sample in samples:
+            due[-(-(sample.stamp.received_ns - start_ns) // TICK_NS)][kind].append(sample)
+    ticks = enumerate(range(start_ns, end_ns + TICK_NS, TICK_NS))
+    return [odometry.update(sensed(tick_ns, imu=due[tick][0], base=due[tick][1])) for tick, tick_ns in ticks]
 
 
 def run(odometry, drive):
@@ -126,7 +128,7 @@ def test_without_an_inertial_unit_exact_wheels_close_a_loop_exactly(kinematics, 
 def test_the_error_is_within_its_covariance():
     errors = []
     for seed in range(6):
-        drive = Drive(OMNI, STILL + loop()[:1500], bias=0.005, noise=0.002, seed=seed)
+        drive = Drive(OMNI, STILL + loop()[:900], bias=0.005, noise=0.002, seed=seed)
         estimate = run(ekf(), drive)[-1]
         error = drive.poses[-1].inverse() @ estimate.odom_from_base
         vector = np.array((error.x, error.y, error.yaw))
@@ -134,7 +136,7 @@ def test_the_error_is_within_its_covariance():
     assert max(errors) < 16.3  # chi-square with 3 degrees of freedom, 99.9 %
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(seed=st.integers(0, 10_000), latest_ms=st.integers(1, 200))
 def test_late_and_disordered_samples_give_the_same_as_ordered_ones(seed, latest_ms):
     drive = Drive(OMNI, STILL[:60] + loop(0.1)[:400], bias=0.01, noise=0.002)
@@ -165,17 +167,6 @@ def test_a_sample_that_is_too_late_or_comes_twice_is_dropped_and_counted():
     assert again.faults == (EstimatorFault.INVALID_INPUT,)
     assert again.dropped == 3
     assert np.array_equal(again.covariance, before.covariance)
-
-
-def test_what_a_late_loop_or_none_yet_could_not_read_in_time_is_no_fault_of_the_device():
-    drive, odometry = square(), ekf()
-    first = odometry.update(sensed(1000 * MS, imu=drive.imu[:200], base=drive.wheels[:100]))
-    assert (first.faults, first.dropped) == ((), 0)
-    late = sensed(1600 * MS, imu=drive.imu[200:320], base=drive.wheels[100:160])
-    after = odometry.update(replace(late, tick=replace(late.tick, skipped=11)))
-    assert (after.faults, after.dropped) == ((), 0)
-    in_time = run(ekf(), drive)[1600 // 50]
-    assert_near(after.odom_from_base, in_time.odom_from_base, 1e-3, 1e-3)
 
 
 def spinning(drive, first, last, extra_rad):
@@ -389,7 +380,7 @@ def test_the_jacobian_is_that_of_the_motion(x, rate, force):
 @given(x=st.lists(finite, min_size=STATES, max_size=STATES), rate=finite)
 def test_process_noise_is_a_covariance(x, rate):
     for known in (True, False):
-        _, _, noise = transition(np.array(x), Inertial(rate, 0.3, 0.1, known, 0.01, 0.1), np.array((1e-5, 1e-3, 1e-3)), 0.005)
+        _, _, noise = transition(np.array(x), (rate, 0.3, 0.1, known, 0.01, 0.1), np.array((1e-5, 1e-3, 1e-3)), 0.005)
         assert np.array_equal(noise, noise.T)
         assert np.linalg.eigvalsh(noise).min() > -1e-15
 
