@@ -10,7 +10,7 @@ from drivers.interface.geometry import wrap_angle
 from drivers.interface.kinematics import WheelKinematics
 from drivers.interface.samples import ImuSample, PoseSample, WheelSample
 from estimators.ekf_algebra import Algebra, squared_surprise
-from estimators.ekf_model import BIASES, GYRO_BIAS, POSE, STATES, VELOCITY, WAY, YAW, Inertial, transition, without_way
+from estimators.ekf_model import BIASES, GYRO_BIAS, POSE, STATES, VELOCITY, WAY, YAW, transition, without_way
 from estimators.ekf_settings import EkfSettings
 from estimators.ekf_state import EkfState
 from estimators.odometry import SECOND_NS
@@ -50,7 +50,7 @@ class MotionFilter:
         self._algebra.warm_up()
         if self._wheels is not None:
             self._wheels.warm_up()
-        transition(np.zeros(STATES), Inertial(0.0, 0.0, 0.0, True, 1.0, 1.0), self._walk_std, 0.01)
+        transition(np.zeros(STATES), (0.0, 0.0, 0.0, True, 1.0, 1.0), self._walk_std, 0.01)
 
     def fold(self, state: EkfState, sample: Sample) -> EkfState:
         """Return the state after a sample that was captured no earlier than the state."""
@@ -155,10 +155,10 @@ class MotionFilter:
             return self._lost(state, time_ns)
         rate_std = s.gyro_noise_rad_s_sqrt_hz if known else s.blind_turn_rad_s_sqrt_hz
         if known and force is not None:
-            inertial = Inertial(rate, *force, True, rate_std, s.accel_noise_m_s2_sqrt_hz)
+            drive = (rate, *force, True, rate_std, s.accel_noise_m_s2_sqrt_hz)
         else:
-            inertial = Inertial(rate, 0.0, 0.0, False, rate_std, s.blind_accel_m_s2_sqrt_hz)
-        x, covariance = self._algebra.propagate(state, *transition(state.x, inertial, self._walk_std, dt_s))
+            drive = (rate, 0.0, 0.0, False, rate_std, s.blind_accel_m_s2_sqrt_hz)
+        x, covariance = self._algebra.propagate(state, *transition(state.x, drive, self._walk_std, dt_s))
         return state._replace(x=x, covariance=covariance, time_ns=time_ns)
 
     def _lost(self, state: EkfState, time_ns: int) -> EkfState:

@@ -21,6 +21,9 @@ POSE, VELOCITY, WAY = slice(X, VX), slice(VX, GYRO_BIAS), slice(WAY_X, STATES)
 BIASES = slice(GYRO_BIAS, WAY_X)
 
 
+Drive = tuple[float, float, float, bool, float, float]
+
+
 class Inertial(NamedTuple):
     """What drives the prediction over a time: yaw rate and specific force, biases not yet taken off."""
 
@@ -63,11 +66,13 @@ def moved(x: F64, inertial: Inertial, dt_s: float) -> tuple[F64, F64]:
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def transition(x: F64, inertial: Inertial, walk_std: F64, dt_s: float) -> tuple[F64, F64, F64]:
+def transition(x: F64, drive: Drive, walk_std: F64, dt_s: float) -> tuple[F64, F64, F64]:
     """Return the state after a time, the transition matrix and the covariance that the time adds: (11,), (11, 11), (11, 11).
 
-    Noise of gyro and accelerometer enters where their biases do; `walk_std`, shape (3,), are the random walks of the biases.
+    `drive` holds the fields of an `Inertial`: a plain tuple enters a compiled function in half the time of a named one.  Noise of
+    gyro and accelerometer enters where their biases do; `walk_std`, shape (3,), are the random walks of the biases.
     """
+    inertial = Inertial(*drive)
     after, jacobian = moved(x, inertial, dt_s)
     noise = np.zeros((STATES, STATES))
     for k in range(3):

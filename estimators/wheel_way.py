@@ -25,6 +25,9 @@ class WheelWay(NamedTuple):
     grip: F64  # (3, 3), the same for wheels that do not slip: what slip is told by
 
 
+Fields = tuple[float, ...]
+
+
 class Trust(NamedTuple):
     """How far wheels are believed, as the settings have it."""
 
@@ -51,7 +54,7 @@ class WheelModel:
         twists = [kinematics.twist(turn) for turn in np.eye(kinematics.wheel_count)]
         self._columns = np.array([(twist.vx, twist.vy, twist.wz) for twist in twists]).T.copy()  # (3, wheels)
         self._counting = settings.encoder_noise_rad**2 * self._columns @ self._columns.T  # (3, 3)
-        self._trust = Trust(*(getattr(settings, name) for name in Trust._fields))
+        self._trust: Fields = tuple(getattr(settings, name) for name in Trust._fields)
         self._still = np.eye(3) * settings.still_std**2
 
     def warm_up(self) -> None:
@@ -79,8 +82,11 @@ class WheelModel:
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _way(columns: F64, turns: F64, rates: F64, elapsed_s: float, counting: F64, trust: Trust) -> tuple[F64, F64, F64, F64]:
-    """Return what a `WheelWay` holds of turns and rates, both of shape (wheels,)."""
+def _way(
+    columns: F64, turns: F64, rates: F64, elapsed_s: float, counting: F64, belief: tuple[float, ...]
+) -> tuple[F64, F64, F64, F64]:
+    """Return what a `WheelWay` holds of turns and rates, both of shape (wheels,); `belief`: the fields of a `Trust`."""
+    trust = Trust(*belief)
     vector, twist = columns @ turns, columns @ rates  # of the tangent: (3,), (3,)
     dx, dy, turned = vector
     if abs(turned) > PARALLEL:
