@@ -109,7 +109,12 @@ def test_the_pose_at_a_past_time_lies_on_the_way():
         lambda s: replace(s, position_rad=np.array([math.nan, 0.0, 0.0])),
         lambda s: replace(s, velocity_rad_s=np.array([0.0, math.inf, 0.0])),
         lambda s: replace(s, position_rad=np.zeros(4), velocity_rad_s=np.zeros(4)),
+        lambda s: replace(s, position_rad=np.array([0.0, -math.inf, 0.0])),
         lambda s: replace(s, stamp=Stamp(2 * PERIOD_NS, 0, 0)),  # from the past
+        lambda s: replace(s, stamp=Stamp(9 * PERIOD_NS, 0, 0)),  # the same time again
+        lambda s: replace(s, stamp=Stamp(0, 0, 0)),
+        lambda s: replace(s, stamp=Stamp(-PERIOD_NS, 0, 0)),  # before time began
+        lambda s: replace(s, stamp=Stamp(-(2**62), 0, 0)),
         lambda s: replace(s, stamp=Stamp(10**12, 0, 0)),  # from the future
     ],
 )
@@ -121,12 +126,33 @@ def test_bad_samples_are_dropped_and_flagged(spoil):
     assert_pose(estimate.odom_from_base, poses[20])
 
 
-def test_a_counter_that_was_reset_moves_nothing_and_counting_goes_on():
+@pytest.mark.parametrize("jump_rad", [1000.0, -1000.0, 0.4, -math.tau * 2**16, 1e12])  # reset, slipped a tooth, wrapped
+def test_a_counter_that_jumps_moves_nothing_and_counting_goes_on(jump_rad):
     samples, poses = samples_of(OMNI, [BodyTwist(0.4, 0.0, 0.0)] * 20)
-    shifted = [replace(s, position_rad=s.position_rad + 1000.0) for s in samples[10:]]
+    shifted = [replace(s, position_rad=s.position_rad + jump_rad) for s in samples[10:]]
     estimate = reckoning(OMNI).update(sensed(20 * PERIOD_NS, base=samples[:10] + shifted))
     assert estimate.faults == INVALID
-    assert estimate.odom_from_base.x == pytest.approx(poses[20].x - 0.4 * 0.005)  # the one interval is lost
+    assert estimate.odom_from_base.x == pytest.approx(poses[20].x - 0.4 * 0.005, abs=1e-4)  # the one interval is lost
+    assert np.isfinite(estimate.covariance).all()
+
+
+def test_all_samples_with_one_stamp_move_nothing():
+    samples, _ = samples_of(OMNI, [BodyTwist(0.4, 0.1, 0.3)] * 20)
+    stuck = [replace(s, stamp=Stamp(PERIOD_NS, 0, i)) for i, s in enumerate(samples)]
+    estimate = reckoning(OMNI).update(sensed(20 * PERIOD_NS, base=stuck))
+    assert estimate.faults == INVALID
+    assert_pose(estimate.odom_from_base, SE2())
+
+
+@pytest.mark.parametrize("pose", [SE2(math.nan, 0.0, 0.0), SE2(0.0, -math.inf, 0.0), SE2(0.0, 0.0, math.nan), SE2(1e9, 0.0, 0.0)])
+def test_a_bad_device_pose_is_dropped_and_flagged(pose):
+    good = [SE2(0.01 * i, 0.0, 0.0) for i in range(20)]
+    poses = [*good[:10], pose, *good[10:]]
+    samples = [PoseSample(Stamp(i * PERIOD_NS, 0, i), at, None, np.eye(3)) for i, at in enumerate(poses)]
+    estimate = reckoning(None).update(sensed(20 * PERIOD_NS, base=samples))
+    assert estimate.faults == INVALID
+    assert math.isfinite(estimate.odom_from_base.x + estimate.odom_from_base.y + estimate.odom_from_base.yaw)
+    assert estimate.odom_from_base.x == pytest.approx(0.19, abs=0.021)  # an interval or two are lost
 
 
 def test_wheels_without_kinematics_are_flagged():
@@ -145,8 +171,9 @@ def test_the_gyro_corrects_slipping_wheels():
     assert_pose(ignored.odom_from_base, SE2().integrate(0.3, 0.0, 0.5, 1.0))
 
 
-def test_a_bad_gyro_sample_is_flagged():
-    bad = ImuSample(Stamp(0, 0, 0), (0.0, 0.0, math.nan), (0.0, 0.0, 9.81))
+@pytest.mark.parametrize(("captured_ns", "rate"), [(0, math.nan), (0, math.inf), (0, 57.3), (10**12, 0.0)])
+def test_a_bad_gyro_sample_is_flagged(captured_ns, rate):
+    bad = ImuSample(Stamp(captured_ns, 0, 0), (0.0, 0.0, rate), (0.0, 0.0, 9.81))
     assert reckoning(SKID).update(sensed(0, imu=[bad])).faults == INVALID
 
 
