@@ -8,6 +8,7 @@ import random
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from runtime.log.verification import Verification, verify
 from tests.runtime.log_cycles import header, make_cycles
 
 PERIOD_NS = 20_000_000
+LATELY_S = 1.0
 SETTINGS = LogSettings(segment_mb=1.0)  # so small that some are killed while one file ends and the next begins
 
 
@@ -37,25 +39,46 @@ def record_until_killed(path: Path) -> None:
         print(index, time.monotonic_ns(), recorder.fault(), flush=True)
 
 
-def lost_after_kill(folder: Path, seed: int) -> str:
-    """Record, kill after a random time and return what is wrong with the log; empty if all older than the interval is there."""
+def lost_after_kill(folder: Path, seed: int, *, shared: bool = False) -> str:
+    """Record, kill after a random time and return what is wrong with the log; empty if all older than the interval is there.
+
+    On a `shared` machine, older than the interval and the time for which threads of the process, over the last second, were
+    ready to go on and had no processor because others had it: no recorder can write then.
+    """
     path = folder / f"{seed}.rrd"
     command = [sys.executable, "-m", "tests.runtime.kill", str(path)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as child:
         assert child.stdout is not None
         said = [child.stdout.readline()]
-        time.sleep(random.Random(seed).uniform(0.3, 2.5))
+        alive_s = random.Random(seed).uniform(0.3, 2.5)
+        time.sleep(max(0.0, alive_s - LATELY_S))
+        before_ns = _kept_waiting_ns(child.pid)
+        time.sleep(min(alive_s, LATELY_S))
+        waited_ns = _kept_waiting_ns(child.pid) - before_ns
         killed_ns = time.monotonic_ns()
         child.kill()
         said += child.stdout.readlines()
     handed_over = [tuple(map(int, line.split()[:2])) for line in said if len(line.split()) >= 2]
-    kept_ns = killed_ns - round(SETTINGS.flush_interval_s * 1e9)
+    kept_ns = killed_ns - round(SETTINGS.flush_interval_s * 1e9) - (waited_ns if shared else 0)
     due = {tick for tick, time_ns in handed_over if time_ns < kept_ns}
     found = _verified(path)
     missing = due - set(range(found.ticks))
     if found.damaged or found.gaps or missing:
-        return f"seed {seed}: damaged {found.damaged}, gaps {found.gaps}, missing {sorted(missing)} of {len(due)}"
+        lost = f"damaged {found.damaged}, gaps {found.gaps}, missing {sorted(missing)} of {len(due)}"
+        return f"seed {seed}: {lost}, waited for a processor {waited_ns * 1e-9:.3f} s"
     return ""
+
+
+def _kept_waiting_ns(process: int) -> int:
+    """Return for how long all threads of a process have waited for a processor so far.
+
+    Source: the Linux kernel's Documentation/scheduler/sched-stats.rst, /proc/PID/schedstat; 0 where it does not count that.
+    """
+    waited_ns = 0
+    for path in Path(f"/proc/{process}/task").glob("*/schedstat"):
+        with suppress(OSError):  # the thread has just ended
+            waited_ns += int(path.read_text().split()[1])
+    return waited_ns
 
 
 def _verified(path: Path) -> Verification:

@@ -9,4 +9,4 @@ from tests.runtime.kill import lost_after_kill
 
 @pytest.mark.parametrize("seed", range(5))
 def test_what_is_older_than_the_flush_interval_survives_a_kill(tmp_path: Path, seed: int) -> None:
-    assert lost_after_kill(tmp_path, seed) == ""
+    assert lost_after_kill(tmp_path, seed, shared=True) == ""
