@@ -23,7 +23,7 @@ def pack_samples(samples: list[Sample]) -> bytes:
     return pack(
         kinds=np.array([kind for kind, _ in rows], dtype=np.int64),
         lengths=np.array([len(values) for _, values in rows], dtype=np.int64),
-        values=np.concatenate([values for _, values in rows]) if rows else np.zeros(0),
+        values=np.array([value for _, values in rows for value in values], dtype=np.float64),
         stamps=np.array(stamps, dtype=np.int64).reshape(-1, 3),
     )
 
@@ -37,16 +37,16 @@ def unpack_samples(packed: bytes) -> list[Sample]:
     return [_sample(kind, stamp, row) for kind, stamp, row in zip(content["kinds"].tolist(), stamps, rows, strict=True)]
 
 
-def _row(sample: Sample) -> tuple[int, F64]:
+def _row(sample: Sample) -> tuple[int, tuple[float, ...]]:
     match sample:
         case ImuSample():
-            return _IMU, np.array((*sample.gyro_rad_s, *sample.accel_m_s2))
+            return _IMU, (*sample.gyro_rad_s, *sample.accel_m_s2)
         case WheelSample():
-            return _WHEELS, np.concatenate((np.ravel(sample.position_rad), np.ravel(sample.velocity_rad_s)))
+            return _WHEELS, (*sample.position_rad.tolist(), *sample.velocity_rad_s.tolist())
         case PoseSample():
             pose, twist = sample.local_from_base, sample.twist
             speeds = (math.nan,) * 3 if twist is None else (twist.vx, twist.vy, twist.wz)
-            return _POSE, np.array((pose.x, pose.y, pose.yaw, *speeds, *sample.covariance.ravel()))
+            return _POSE, (pose.x, pose.y, pose.yaw, *speeds, *sample.covariance.ravel().tolist())
 
 
 def _sample(kind: int, stamp: Stamp, row: F64) -> Sample:
