@@ -35,6 +35,7 @@ SAMPLE = np.dtype(
 )
 GRACE_STATES = 200  # for opening to succeed: an arm in a reflex is there, and the operator's reset must be able to reach it
 READY_MODES = frozenset({"Idle", "Move", "AutomaticErrorRecovery"})
+NOTHING = np.zeros(0)
 BRAKE_MS = 1500  # the longest that closing waits for the arm to stand
 BELIEVED_RAD = 0.1  # beyond a joint's range
 FROZEN_AFTER = 20  # equal states in a row: a torque sensor is never so quiet
@@ -69,6 +70,7 @@ class FrankaSession:
         self._client: Client | None = None
         self._exchange: Exchange | None = None  # of the motion that runs
         self._last: ArmState | None = None
+        self._order = NOTHING  # that is being followed
         self._sequence = 0
         self._phase = Phase.READY
         self._prepared = False
@@ -121,6 +123,8 @@ class FrankaSession:
 
     def send(self, values: NDArray[np.float64], now_ns: int) -> None:
         """Follow a trajectory; the first one begins a motion."""
+        if self._exchange is not None and np.array_equal(values, self._order):
+            return  # the same again: it only lives longer, and a spline takes its time to build
         trajectory = unpacked(values)
         if self._phase is Phase.FAULTED or not self._prepared or self._last is None or self._client is None:
             return
@@ -133,11 +137,13 @@ class FrankaSession:
             except MotionAbortedError as aborted:
                 self._abort(str(aborted))
                 return
-            self._exchange, self._phase = Exchange(self._last), Phase.MOVING
+            self._exchange, self._phase, self._order = Exchange(self._last), Phase.MOVING, NOTHING
+        self._order = values
         self._exchange.follow(replace(trajectory, start_ns=self._robot_clock.to_robot(trajectory.start_ns)))
 
     def rest(self) -> None:
         """Decelerate to rest."""
+        self._order = NOTHING
         if self._exchange is not None:
             self._exchange.stop()
 

@@ -3,9 +3,11 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from drivers.interface.commands import BaseLimits, BodyTwist, Command
+from drivers.interface.arm_motion import PANDA
+from drivers.interface.commands import BaseLimits, BodyTwist, Command, JointTrajectory
 from drivers.interface.devices import DeviceState
 from drivers.interface.geometry import SE2
 from drivers.interface.samples import EmergencyStop, Jog, ResetFaults, SetEnabled, SetPaused, Stamp, TruthSample
@@ -142,6 +144,18 @@ def test_half_the_rate_slows_the_robot() -> None:
     verdicts = [guard.admit(FORWARD, belief(k), sensed(k, base=(wheels(k * PERIOD_NS - MS, k),))) for k in range(120)]
     assert present(verdicts[-1]) == {Fault.WRONG_RATE}
     assert verdicts[-1].command.base.vx <= 0.375 + 1e-6
+
+
+def test_half_the_rate_slows_the_arm_as_well() -> None:
+    setup = SupervisorSetup(PERIOD_NS * 1e-9, None, PERIOD_NS, has_operator=True, arm_limits=PANDA)
+    guard = Supervisor(SupervisorSection(startup_grace_s=0.0, slow_factor=0.4), setup, Passing(), FaultBoard())
+    knots = np.stack((PANDA.position_min_rad, PANDA.position_max_rad))
+    plan = Plan(None, JointTrajectory(0, np.array([0.0, 9.0]), knots, np.zeros_like(knots)))
+    verdicts = [guard.admit(plan, belief(k), sensed(k, base=(wheels(k * PERIOD_NS - MS, k),))) for k in range(120)]
+    assert verdicts[0].command.arm.speed_factor == 1.0
+    assert present(verdicts[-1]) == {Fault.WRONG_RATE}
+    assert verdicts[-1].command.arm.speed_factor == 0.4
+    assert verdicts[-1].asked.arm.speed_factor == 1.0
 
 
 def skipping(index: int, skipped: int) -> Sensed:

@@ -1,0 +1,66 @@
+"""How the arm's 1 kHz exchange keeps up while the loop plans, and how soon the arm stands when its driver is killed."""
+
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+
+from drivers.franka.driver import ExchangeFigures
+from runtime import configuration
+from runtime.assembly import Assembly
+from runtime.run import RunOptions, run
+from tests.benchmarks.figure import Figure, of_distribution
+from tests.faults.arm_dead_man import arm_scene
+from tests.faults.emulated import ROOT, free_port
+from tests.sim_drivers.firmware.fcibench import free_host
+
+TRIES = 20
+ROUNDS = 3
+COMMAND = "from runtime.cli import main; main()"
+
+
+def figures() -> list[Figure]:
+    """Run the way-point mission against an emulated arm, then strike at a swinging one."""
+    measured = _exchange()
+    with arm_scene() as scene:
+        for blow in ("kill", "stop", "kill_io"):
+            tries = [scene.attempt(blow) for _ in range(TRIES)]
+            measured.append(of_distribution(f"arm_dead_man_{blow}_still", [1e3 * each.still_s for each in tries]))
+    return measured
+
+
+@dataclass
+class _Watched:
+    """The exchange's figures as of the last tick."""
+
+    assembly: Assembly | None = None
+    exchange: ExchangeFigures | None = None
+
+    def ready(self, assembly: Assembly) -> None:
+        self.assembly = assembly
+
+    def look(self, _: object) -> None:
+        assert self.assembly is not None
+        self.exchange = self.assembly.robot.devices.arm.exchange
+
+
+def _exchange() -> list[Figure]:
+    told = (
+        "robot=franka_emulated", f"robot.arm.host={free_host()}", f"robot.truth.port={free_port()}",
+        f"planner.rounds={ROUNDS}", "mission.time_limit_s=60", "robot.truth.open_timeout_s=30",
+    )  # fmt: skip
+    words = [word for change in (*told, "loop.system.priority=50") for word in ("--set", change)]
+    command = [sys.executable, "-c", COMMAND, "emulate", "arm_waypoints", *words]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as world:
+        try:
+            while not world.stdout.readline().startswith("ready"):
+                assert world.poll() is None
+            watched = _Watched()
+            load = os.getloadavg()[0]
+            result = run(configuration.load("arm_waypoints", told), RunOptions(progress=watched.look, ready=watched.ready))
+            assert result.report.outcome == "reached", result.report
+            kept = watched.exchange
+            print(f"# FCI exchange: {kept}, load average {load:.1f}")
+            return [Figure("fci_cycles_lost", 100.0 * (1.0 - kept.kept), unit="%")]
+        finally:
+            world.terminate()
