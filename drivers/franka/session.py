@@ -154,6 +154,7 @@ class FrankaSession:
         try:
             if self._client.read().mode == "Reflex":
                 self._client.recover()
+            self._seen = GRACE_STATES
             self._be_ready()
         except MotionAbortedError as aborted:
             self._fail(f"its errors could not be cleared: {aborted}")
@@ -191,7 +192,6 @@ class FrankaSession:
 
     def _judge(self, state: ArmState) -> None:
         """See, while no motion runs, whether one could, and set the arm up for it."""
-        self._seen += 1
         if self._seen <= GRACE_STATES and state.mode != "Idle":
             return
         if state.mode == "UserStopped":
@@ -227,6 +227,7 @@ class FrankaSession:
         last, self._last = self._last, state
         self._robot_clock.update(state.robot_ns, now_ns)
         self._health.received += 1
+        self._seen += 1
         if last is not None:
             self._states_lost += (state.robot_ns - last.robot_ns) // MILLISECOND_NS - 1
             self._health.figures[STATES_LOST] = self._states_lost
