@@ -37,6 +37,18 @@ class Diagnostics:
 
 
 @dataclass(frozen=True, slots=True)
+class Drawing:
+    """What a planner or shield shows of how it decided, for display only: lines through points, or the points themselves.
+
+    Drawings of one name follow one another in the scene; one whose name is missing at a tick is wiped.
+    """
+
+    name: str
+    points_in_odom: NDArray[np.float64]  # (n, 2)
+    connected: bool = True  # a line through the points, else dots
+
+
+@dataclass(frozen=True, slots=True)
 class Plan:
     """What a planner asks for.  None for a device: it is asked nothing; the supervisor lets it rest."""
 
@@ -45,6 +57,7 @@ class Plan:
     path_in_odom: NDArray[np.float64] = field(default_factory=no_path)  # (n, 2), what it means to do; for display only
     diagnostics: Diagnostics = field(default_factory=Diagnostics)
     latency_ns: int = 0  # how long after the belief the command is meant to take effect
+    drawings: tuple[Drawing, ...] = ()
     accomplished: bool | None = None  # of a mission that the planner itself holds; None: it holds none
 
 

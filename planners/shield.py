@@ -9,7 +9,7 @@ from drivers.interface.commands import BaseLimits, BodyTwist, Command
 from drivers.interface.settings import Settings
 from drivers.interface.stateful import Stateful
 from estimators.belief import Belief
-from planners.planner import Diagnostics
+from planners.planner import Diagnostics, Drawing
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +45,7 @@ class Filtered:
     command: Command
     intervened: bool = False
     diagnostics: Diagnostics = field(default_factory=Diagnostics)
+    drawings: tuple[Drawing, ...] = ()
 
 
 @runtime_checkable

@@ -25,7 +25,7 @@ def known_length(known: Mask, corner: F64, cell_m: float, points: F64, body_m: f
 
     The first `body_m` of the curve are not looked at; off the grid nothing is known.
     """
-    along, unknown_since, step = 0.0, np.inf, 0.5 * cell_m
+    along, seen_to, unknown_since, step = 0.0, 0.0, np.inf, 0.5 * cell_m
     rows, columns = known.shape
     for i in range(len(points) - 1):
         dx, dy = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1]
@@ -37,9 +37,9 @@ def known_length(known: Mask, corner: F64, cell_m: float, points: F64, body_m: f
             row, column = int(np.floor((y - corner[1]) / cell_m)), int(np.floor((x - corner[0]) / cell_m))
             seen = here <= body_m or (0 <= row < rows and 0 <= column < columns and known[row, column])
             if seen:
-                unknown_since = np.inf
+                unknown_since, seen_to = np.inf, here
             else:
-                unknown_since = min(unknown_since, here)
+                unknown_since = min(unknown_since, seen_to)
                 if here - unknown_since >= gap_m:
                     return float(unknown_since)
         along += length

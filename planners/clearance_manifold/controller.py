@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-
-import numpy as np
 
 from drivers.interface.commands import BaseLimits, BodyTwist
 from drivers.interface.geometry import SE2, wrap_angle
@@ -13,6 +10,8 @@ from estimators.belief import F64
 from planners.clearance_manifold.control_kernels import brakable, longitudinal
 from planners.clearance_manifold.settings import ControllerSettings
 from planners.point_ds.kernels import within
+
+STANDSTILL_M_S = 0.01  # a base that cannot strafe turns on the spot below this
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +54,7 @@ class ManifoldController:
         if at.feasible and speed + float(push @ tangent) < s.progress_m_s:
             speed = min(s.progress_m_s, brakable(at.free_m, s.deceleration_m_s2, s.delay_s))
         if not self._limits.holonomic:
-            return self._look_ahead_twist(push + speed * tangent), speed
+            return self._look_ahead_twist(push + speed * tangent, self.turn(at, yaw)), speed
         cap_y = cap.vy
         low_x = -cap.vx if self._limits.reverse else 0.0
         push_x, push_y = within(float(push[0]), float(push[1]), low_x if low_x < 0.0 else -1e-9, cap.vx, cap_y)
@@ -69,15 +68,13 @@ class ManifoldController:
         cap = self._limits.velocity.wz
         return min(max(self._settings.heading_gain_per_s * wrap_angle(at.heading_rad - yaw), -cap), cap)
 
-    def _look_ahead_twist(self, u: F64) -> BodyTwist:
+    def _look_ahead_twist(self, u: F64, turn: float) -> BodyTwist:
         """Return the twist that moves the point `look_ahead_m` ahead with velocity u, shape (2,), in the body frame.
 
-        Feedback linearisation: v = u_x, w = u_y / d.  What points backwards is turned to on the spot.
+        Feedback linearisation: v = u_x, w = u_y / d.  What does not point ahead is turned to on the spot.
         """
         cap, d = self._limits.velocity, self._settings.look_ahead_m
-        if u[0] <= 0.0:
-            bearing = math.atan2(float(u[1]), float(u[0])) if float(np.hypot(*u)) > 1e-9 else 0.0
-            wz = self._settings.heading_gain_per_s * bearing
-            return BodyTwist(0.0, 0.0, min(max(wz, -cap.wz), cap.wz))
+        if u[0] <= STANDSTILL_M_S:
+            return BodyTwist(0.0, 0.0, turn)
         vx, wz_d = within(float(u[0]), float(u[1]), -cap.vx, cap.vx, cap.wz * d)
         return BodyTwist(vx, 0.0, wz_d / d)

@@ -15,15 +15,19 @@ from planners.clearance_manifold.ridge_kernels import (
     Sections,
     along_manifold,
     boxes,
-    follow_branch,
+    cheapest_branch,
+    cost_along,
+    encounters,
     profiles,
     repair_all,
-)  # fmt: skip
+    station_costs,
+)
 from planners.clearance_manifold.settings import SolverSettings, TrackerSettings
 
 CURVATURE_LENGTH_M = 0.5  # at which curvature costs as much as slope
 CENTRING = 0.05
-TURN = 0.5
+TURN = 1.5
+ENCOUNTER_S = 3.0  # how far ahead a side is chosen for
 LIKING = 0.3
 
 
@@ -36,6 +40,10 @@ class Scene:
     arcs_m: F64  # (n,), of the stations, on the chart
     confidence: F64  # (n,), of the observation at the centre line
     robot_m: float  # lateral offset of the robot
+    robot: F64  # (2,), in odom
+    end: int  # stations from here on lie beyond the goal and ask for nothing
+    speed_m_s: float  # that arrivals are expected at
+    closing: F64  # (5,), what closes in (`nearest_closing`)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,19 +74,31 @@ class Solver:
             stations.arcs_m, (s.weight_data, s.weight_homotopy, temporal), s.weight_smooth, CURVATURE_LENGTH_M
         )
 
-    def branch(self, scene: Scene, liked: F64 | None) -> tuple[F64, float, int]:
-        """Return the best branch ahead, shape (forward + 1,), its least clearance [m] and how many of its stations are wide enough."""
+    def branch(self, scene: Scene, liked: F64 | None) -> tuple[F64, float]:
+        """Return the best branch ahead, shape (forward + 1,), and what the branch followed so far costs more per station [m].
+
+        Args:
+            scene: what it is laid through.
+            liked: offsets followed so far, shape (n,), NaN where there are none; they are preferred.
+        """
         own = self._stations.own
-        ahead = Sections(*(part[own:] for part in scene.sections))
-        rho = profiles(scene.ground, ahead, self._offsets)
-        wanted = np.full(len(rho), np.nan) if liked is None else liked[own:]
-        y, clearance = follow_branch(rho, self._offsets, self._spacing, scene.robot_m, wanted, LIKING, self._demand, TURN)
-        wide = clearance >= self.least_m
-        return y, float(clearance.min()), int(len(wide) if wide.all() else np.argmin(wide))
+        ahead = Sections(*(part[own : scene.end] for part in scene.sections))
+        apart = encounters(ahead, self._offsets, scene.robot, scene.speed_m_s, ENCOUNTER_S, scene.closing)
+        costs = station_costs(profiles(scene.ground, ahead, self._offsets), apart, self._offsets, self._demand)
+        if liked is not None:
+            wanted = liked[own : scene.end, None]
+            costs += np.where(np.isfinite(wanted), LIKING * np.abs(self._offsets - wanted), 0.0)
+        spacing = self._spacing[: len(costs) - 1]
+        y, least = cheapest_branch(costs, self._offsets, spacing, scene.robot_m, TURN)
+        beyond = np.full(len(scene.arcs_m) - scene.end, np.nan)
+        if liked is None or not np.isfinite(liked).all():
+            return np.concatenate((y, beyond)), 0.0
+        now = cost_along(costs, self._offsets, spacing, scene.robot_m, TURN, liked[own : scene.end])
+        return np.concatenate((y, beyond)), (now - least) / len(y)
 
     def extract(self, scene: Scene, prior: Prior | None) -> Manifold:
         """Return the manifold of the two-stage solver; with a prior, the branch followed so far is preferred."""
-        ahead, _, _ = self.branch(scene, None if prior is None else prior.offset_m)
+        ahead, _ = self.branch(scene, None if prior is None else prior.offset_m)
         own = self._stations.own
         inside = np.concatenate((np.full(own, ahead[0] if prior is None else np.nan), ahead))
         if prior is not None:
@@ -92,9 +112,11 @@ class Solver:
             scene.ground, scene.sections, prior.offset_m, tubes_m, self._stations.own, self._tracker.hysteresis, self._demand
         )
         own, n = self._stations.own, len(inside)
-        if 0 < repaired < n - own:  # regrow the suffix from the last valid station
+        repaired = min(repaired, scene.end - own)
+        inside[scene.end :] = np.nan
+        if 0 < repaired < scene.end - own:  # regrow the suffix from the last valid station
             liked = np.where(np.arange(n) < own + repaired, prior.offset_m, np.nan)
-            regrown, _, _ = self.branch(scene, liked)
+            regrown, _ = self.branch(scene, liked)
             inside[own + repaired :] = regrown[repaired:]
         found = boxes(scene.ground, scene.sections, inside, self._step_m, self._demand)
         near = np.where(np.isfinite(found[:, 2]), found[:, 2], prior.offset_m)
@@ -119,7 +141,8 @@ class Solver:
         offset, duals, converged = program.solve((ridge, *anchors), low, high, np.where(np.isfinite(start), start, ridge), duals)
         points = points_of(scene.sections, offset)
         clearance = along_manifold(scene.ground, points)
-        return Manifold(scene.arcs_m, offset, points, low, high, ridge, clearance, valid, own), duals, converged
+        whole = own + valid >= scene.end
+        return Manifold(scene.arcs_m, offset, points, low, high, ridge, clearance, valid, own, whole), duals, converged
 
 
 def _filled(values: F64, otherwise: float) -> F64:

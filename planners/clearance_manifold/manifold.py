@@ -38,6 +38,7 @@ class Manifold:
     clearance_m: F64  # (n,), predicted, on the manifold
     valid: int  # stations from the robot's own on that have a box, without gap
     own: int
+    whole: bool  # it goes to the goal, or as far as is looked
 
     @property
     def reach_m(self) -> float:

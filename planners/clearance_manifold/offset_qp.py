@@ -53,7 +53,7 @@ class OffsetProgram:
         self._solver.setup(
             sparse.csc_matrix(np.triu(self.quadratic)), np.zeros(n), sparse.identity(n, format="csc"),
             np.full(n, -FAR_M), np.full(n, FAR_M),
-            verbose=False, adaptive_rho=False, rho=0.5, rho_is_vec=False, scaling=0, polishing=False,
+            verbose=False, adaptive_rho=False, rho=40.0, rho_is_vec=False, scaling=0, polishing=False,
             eps_abs=1e-5, eps_rel=1e-5, max_iter=400, check_termination=10, warm_starting=True,
         )  # fmt: skip
 

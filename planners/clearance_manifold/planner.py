@@ -14,24 +14,25 @@ import numpy as np
 
 from drivers.interface.commands import BodyTwist
 from drivers.interface.errors import ConfigurationError
-from drivers.interface.geometry import SE2
+from drivers.interface.geometry import SE2, wrap_angle
 from drivers.interface.stateful import pack, unpack
-from estimators.belief import F32, F64, Belief
+from estimators.belief import F64, Belief
 from estimators.field_query import sample
 from planners.clearance_manifold.chart import Chart, lay_chart
 from planners.clearance_manifold.control_kernels import brakable, known_length
 from planners.clearance_manifold.controller import ManifoldController, Situation
 from planners.clearance_manifold.extraction import Scene, Solver
 from planners.clearance_manifold.manifold import Manifold, Stations
-from planners.clearance_manifold.prediction import ArrivalField
+from planners.clearance_manifold.prediction import ArrivalField, Predicted
 from planners.clearance_manifold.properties import Properties, check
 from planners.clearance_manifold.ridge_kernels import Ground, Sections
 from planners.clearance_manifold.settings import ClearanceManifoldSettings
 from planners.clearance_manifold.tracker import Continuation, Tracker, heading
 from planners.clearance_manifold.warm_up import rehearse
-from planners.planner import Diagnostics, Plan, PlannerSetup
+from planners.planner import Diagnostics, Drawing, Plan, PlannerSetup
 from planners.router import Route
 
+LOOK_AT_MOST_DEG = 120.0  # what closes in from behind is not turned to
 UNKNOWN_GAP_M = 0.15  # shorter stretches of unknown cells are holes in a depth image, not the edge of what was seen
 
 
@@ -104,9 +105,9 @@ class ClearanceManifold:
         assert self._chart is not None
         scene = self._scene(self._chart, predicted, belief, point)
         told = self._tracker.advance(scene, belief, new_goal)
-        situation = self._situation(told, scene, belief, point)
+        situation = self._situation(told, belief, point, predicted.closing)
         twist, speed = self._controller.command(situation, pose.yaw)
-        return self._plan(told, situation, twist, speed)
+        return self._plan(scene, told, situation, twist, speed)
 
     def _refusal(self, belief: Belief, route: Route) -> str:
         """Return why there is nothing to do, or nothing."""
@@ -149,7 +150,7 @@ class ClearanceManifold:
         arcs = np.arange(self._arc_m - self._settings.solver.rear_m, self._arc_m - 0.3, 0.1)
         return self._chart.frames(arcs, 1.0)[0]
 
-    def _scene(self, chart: Chart, predicted: F32, belief: Belief, point: F64) -> Scene:
+    def _scene(self, chart: Chart, predicted: Predicted, belief: Belief, point: F64) -> Scene:
         lattice, s = belief.clearance.lattice, self._settings.solver
         arcs_m = self._arc_m + self._stations.arcs_m
         sections = Sections(*chart.frames(arcs_m, s.half_width_m))
@@ -157,9 +158,24 @@ class ClearanceManifold:
         confidence = np.exp(-age_s / self._settings.prediction.confidence_decay_s)
         own = self._stations.own
         lateral_m = float((point - sections.at[own]) @ sections.normal[own])
-        return Scene(Ground(predicted, lattice.x_m, lattice.y_m, lattice.cell_m), sections, arcs_m, confidence, lateral_m)
+        return Scene(
+            Ground(predicted.clearance_m, lattice.x_m, lattice.y_m, lattice.cell_m),
+            sections,
+            arcs_m,
+            confidence,
+            lateral_m,
+            point,
+            self._end(chart),
+            predicted.speed_m_s,
+            predicted.closing,
+        )
 
-    def _situation(self, told: Continuation, scene: Scene, belief: Belief, point: F64) -> Situation:
+    def _end(self, chart: Chart) -> int:
+        """Return the index of the first station beyond the goal; the robot's own and the next always count."""
+        left_m = chart.length_m - self._arc_m
+        return max(self._stations.own + 2, int(np.searchsorted(self._stations.arcs_m, left_m, side="right")))
+
+    def _situation(self, told: Continuation, belief: Belief, point: F64, closing: F64) -> Situation:
         """Project the robot onto the manifold and read what the controller needs."""
         manifold, own, s = told.manifold, self._stations.own, self._settings.controller
         tangent = manifold.tangents()[own]
@@ -175,9 +191,20 @@ class ClearanceManifold:
             margin_m=float(clearance.min()) - self._solver.least_m if clearance.size else 0.0,
             commitment=self._commitment(manifold, belief),
             free_m=self._free_length(manifold, belief),
-            heading_rad=heading(manifold.points[own : own + look]),
+            heading_rad=self._look(heading(manifold.points[own : own + look]), closing, point),
             feasible=manifold.valid > 1,
         )
+
+    def _look(self, along_rad: float, closing: F64, point: F64) -> float:
+        """Return where to look: along the manifold, but turned as far as it takes to keep in view what closes in."""
+        if closing[4] == 0.0:
+            return along_rad
+        s = self._settings
+        room_rad = math.radians(max(0.0, 0.5 * s.prediction.fov_deg - s.controller.view_margin_deg))
+        off_rad = wrap_angle(math.atan2(closing[1] - point[1], closing[0] - point[0]) - along_rad)
+        if abs(off_rad) > math.radians(LOOK_AT_MOST_DEG):
+            return along_rad
+        return along_rad + math.copysign(max(0.0, abs(off_rad) - room_rad), off_rad)
 
     def _commitment(self, manifold: Manifold, belief: Belief) -> float:
         """Return a_pred, the largest share of the prediction with which all of the manifold keeps rho_min."""
@@ -202,11 +229,10 @@ class ClearanceManifold:
             belief.clearance.known, corner, lattice.cell_m, manifold.points[manifold.own :], s.body_m, UNKNOWN_GAP_M
         )
         goal_m = max(0.0, self._chart.length_m - self._arc_m)
-        end = len(manifold.arcs_m) - manifold.own
-        reach_m = math.inf if manifold.valid == end else manifold.reach_m
-        return min(reach_m, max(0.0, known_m - s.body_m), goal_m)
+        reach_m = math.inf if manifold.whole else manifold.reach_m
+        return float(min(reach_m, max(0.0, known_m - s.body_m), goal_m))
 
-    def _plan(self, told: Continuation, at: Situation, twist: BodyTwist, speed: float) -> Plan:
+    def _plan(self, scene: Scene, told: Continuation, at: Situation, twist: BodyTwist, speed: float) -> Plan:
         s, manifold = self._settings, told.manifold
         error_m = float(np.hypot(*at.error))
         stops = speed <= brakable(at.free_m, s.controller.deceleration_m_s2, s.controller.delay_s) + 1e-9
@@ -216,8 +242,10 @@ class ClearanceManifold:
         )  # fmt: skip
         tracking = told.category.value == "none"
         self._ticks += (int(tracking), 1)
-        path = manifold.points[manifold.ahead] if manifold.valid else np.zeros((0, 2))
-        return Plan(twist, path_in_odom=path, diagnostics=self._diagnostics(told, at, held, speed, error_m))
+        diagnostics = self._diagnostics(told, at, held, speed, error_m)
+        return Plan(
+            twist, path_in_odom=manifold.points[manifold.ahead], diagnostics=diagnostics, drawings=_drawn(scene, manifold)
+        )
 
     def _diagnostics(
         self, told: Continuation, at: Situation, held: Properties, speed: float, error_m: float
@@ -264,3 +292,15 @@ class ClearanceManifold:
         self._arc_m, self._ticks = float(state["arc_m"]), state["ticks"]
         self._field.take(state)
         self._tracker.take(state)
+
+
+def _drawn(scene: Scene, manifold: Manifold) -> tuple[Drawing, ...]:
+    """Return centre line, ridge and box, where there is one."""
+    at, normal, reach = (part[manifold.ahead] for part in scene.sections)
+    lines = (
+        ("centre_line", scene.sections.at),
+        ("ridge", at + manifold.ridge_m[manifold.ahead, None] * normal),
+        ("box_right", at + np.maximum(manifold.low_m[manifold.ahead], reach[:, 0])[:, None] * normal),
+        ("box_left", at + np.minimum(manifold.high_m[manifold.ahead], reach[:, 1])[:, None] * normal),
+    )
+    return tuple(Drawing(name, points) for name, points in lines)

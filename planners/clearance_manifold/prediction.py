@@ -3,20 +3,32 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.interface.samples import frozen_array
-from estimators.belief import F32, Belief, ClearanceField, Lattice
+from estimators.belief import F32, F64, Belief, ClearanceField, Lattice
 from estimators.clearance import distance_to
 from estimators.rolling import transfer
-from planners.clearance_manifold.prediction_kernels import Arrival, observe, occupied_on_arrival
+from planners.clearance_manifold.prediction_kernels import Arrival, free_on_arrival, nearest_closing, observe
 from planners.clearance_manifold.settings import PredictionSettings
 
 NEVER_S = 1e6  # age of what was never in view
+CLOSING_M_S = 0.25
+LEAST_CELLS = 6
 SECOND_NS = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Predicted:
+    """The field on arrival."""
+
+    clearance_m: F32  # (rows, columns), Gamma_pred
+    closing: F64  # (5,), of what closes in: middle in odom [m], velocity [m/s], number of cells, 0 where nothing does
+    speed_m_s: float  # that arrivals are expected at
 
 
 class ArrivalField:
@@ -34,19 +46,21 @@ class ArrivalField:
         field, known = frozen_array(np.ones((3, 3), np.float32)), frozen_array(np.ones((3, 3), np.bool_))
         age_s = np.zeros((3, 3), np.float32)
         observe(age_s, known, np.zeros(2), 1.0, np.zeros(3), 1.0, 1.0, 0.0)
-        occupied_on_arrival(field, field, age_s, np.zeros(2), 1.0, np.zeros(2), self._arrival(0.0))
+        free_on_arrival(field, field, age_s, np.zeros(2), 1.0, np.zeros(2), self._arrival(0.0))
+        nearest_closing(field, field, np.zeros(2), 1.0, np.zeros(2), CLOSING_M_S)
 
-    def update(self, belief: Belief) -> F32:
-        """Take in what is seen now and return Gamma_pred [m] on the belief's lattice, shape (rows, columns)."""
+    def update(self, belief: Belief) -> Predicted:
+        """Take in what is seen now and return the prediction on the belief's lattice."""
         field, pose = belief.clearance, belief.odom_from_base
         self._observe(belief)
         corner = np.array([field.lattice.x_m, field.lattice.y_m])
-        free = occupied_on_arrival(
-            field.clearance_m, field.rate_m_s, self._age_s, corner, field.lattice.cell_m, np.array([pose.x, pose.y]),
-            self._arrival(belief.twist.speed_m_s),
-        )  # fmt: skip
-        predicted: F32 = distance_to(free == 0, field.lattice.cell_m)
-        return predicted
+        robot, arrival = np.array([pose.x, pose.y]), self._arrival(belief.twist.speed_m_s)
+        cell_m = field.lattice.cell_m
+        free = free_on_arrival(field.clearance_m, field.rate_m_s, self._age_s, corner, cell_m, robot, arrival)
+        closing = nearest_closing(field.clearance_m, field.rate_m_s, corner, cell_m, robot, CLOSING_M_S)
+        if closing[4] < LEAST_CELLS:
+            closing[4] = 0.0
+        return Predicted(distance_to(free == 0, cell_m), closing, arrival.speed_m_s)
 
     @property
     def confidence(self) -> F32:
@@ -60,7 +74,7 @@ class ArrivalField:
 
     def _arrival(self, speed_m_s: float) -> Arrival:
         s = self._settings
-        expected = max(0.5 * (speed_m_s + s.nominal_speed_m_s), s.speed_floor_m_s)
+        expected = min(max(speed_m_s, s.speed_floor_m_s), s.nominal_speed_m_s)
         return Arrival(expected, s.horizon_max_s, s.trust_decay_s, s.confidence_decay_s)
 
     def _observe(self, belief: Belief) -> None:

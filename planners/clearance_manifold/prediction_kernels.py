@@ -6,9 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from estimators.belief import F32, F64, Mask
+from estimators.belief import F32, F64, U8, Mask
+
+MOVER_M = 0.8  # cells this near to each other belong to one boundary
 
 
 class Arrival(NamedTuple):
@@ -36,12 +37,10 @@ def observe(
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def occupied_on_arrival(
-    clearance: F32, rate: F32, age_s: F32, corner: F64, cell_m: float, robot: F64, arrival: Arrival
-) -> NDArray[np.uint8]:
-    """Return where equation 2 leaves no clearance, 0 there and 1 elsewhere, shape (rows, columns).
+def free_on_arrival(clearance: F32, rate: F32, age_s: F32, corner: F64, cell_m: float, robot: F64, arrival: Arrival) -> U8:
+    """Return 0 where equation 2 leaves no clearance and 1 elsewhere, shape (rows, columns).
 
-    Source: Cui, Deng, Wang, equation 2: clearance + h c c_pred rate <= 0, with h the time to get there, c the confidence in an
+    Source: Cui, Deng, Wang, equation 2: clearance + h c c_pred rate, with h the time to get there, c the confidence in an
     observation of this age and c_pred the trust in a rate over h.
     """
     free = np.empty(clearance.shape, np.uint8)
@@ -52,7 +51,59 @@ def occupied_on_arrival(
             if change < 0.0 < value:
                 x = corner[0] + (column + 0.5) * cell_m - robot[0]
                 h = min(np.sqrt(x * x + y * y) / arrival.speed_m_s, arrival.horizon_max_s)
-                trust = np.exp(-h / arrival.trust_decay_s - age_s[row, column] / arrival.confidence_decay_s)
-                value = value + h * trust * change
+                confidence = np.exp(-age_s[row, column] / arrival.confidence_decay_s)
+                trust = arrival.trust_decay_s / (arrival.trust_decay_s + h)
+                value = value + h * confidence * trust * change
             free[row, column] = value > 0.0
     return free
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def nearest_closing(clearance: F32, rate: F32, corner: F64, cell_m: float, robot: F64, closing_m_s: float) -> F64:
+    """Return the boundary that closes in nearest to the robot: its middle in odom, its velocity, its number of cells, shape (5,).
+
+    Around a boundary that moves with velocity v the field changes by -grad . v; v is the least-squares fit of that over the
+    cells beside it, so that it needs no obstacle, only slopes and rates.
+
+    Args:
+        clearance: shape (rows, columns) [m].
+        rate: shape (rows, columns) [m/s].
+        corner: lower corner of the lattice in odom, shape (2,).
+        cell_m: size of a cell.
+        robot: in odom, shape (2,).
+        closing_m_s: slower boundaries are not looked at.
+    """
+    rows, columns = clearance.shape
+    found, at = 0, np.empty((rows * columns, 2), np.int64)
+    nearest, near_x, near_y = np.inf, 0.0, 0.0
+    for row in range(1, rows - 1):
+        for column in range(1, columns - 1):
+            change = rate[row, column]
+            if abs(change) < closing_m_s or not 0.0 < clearance[row, column] <= 5.0 * cell_m:
+                continue
+            at[found, 0], at[found, 1] = row, column
+            found += 1
+            x, y = corner[0] + (column + 0.5) * cell_m, corner[1] + (row + 0.5) * cell_m
+            distance = np.hypot(x - robot[0], y - robot[1])
+            if change < 0.0 and distance < nearest:
+                nearest, near_x, near_y = distance, x, y
+    out = np.zeros(5)
+    a, b, d, e, f = 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(found):
+        row, column = at[i]
+        x, y = corner[0] + (column + 0.5) * cell_m, corner[1] + (row + 0.5) * cell_m
+        if (x - near_x) ** 2 + (y - near_y) ** 2 > MOVER_M * MOVER_M:
+            continue
+        slope_x = (clearance[row, column + 1] - clearance[row, column - 1]) / (2.0 * cell_m)
+        slope_y = (clearance[row + 1, column] - clearance[row - 1, column]) / (2.0 * cell_m)
+        a, b, d = a + slope_x * slope_x, b + slope_x * slope_y, d + slope_y * slope_y
+        e, f = e - slope_x * rate[row, column], f - slope_y * rate[row, column]
+        out[0] += x - slope_x * clearance[row, column]
+        out[1] += y - slope_y * clearance[row, column]
+        out[4] += 1.0
+    if out[4] > 0.0:
+        out[0], out[1] = out[0] / out[4], out[1] / out[4]
+        a, d = a + 0.05 * out[4], d + 0.05 * out[4]
+        determinant = a * d - b * b
+        out[2], out[3] = (d * e - b * f) / determinant, (a * f - b * e) / determinant
+    return out

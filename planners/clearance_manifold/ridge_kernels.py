@@ -10,7 +10,9 @@ from numba import njit
 from estimators.belief import F32, F64
 from estimators.field_query import bilinear
 
-_FINE = 5  # steps of the box's scan per cell
+_FINE = 5  # samples of a tube, to either side
+BODY_M = 0.25  # from the middle of a boundary that closes in to its sides
+AWAY = 4.0  # cost of a squared distance between the robot and its own station, per square metre
 
 
 class Sections(NamedTuple):
@@ -83,59 +85,112 @@ def box_around(ground: Ground, sections: Sections, i: int, inside: float, step_m
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def profiles(ground: Ground, sections: Sections, offsets: F64) -> F64:
     """Return rho at every station and offset, shape (n, m); -1 beyond a section's reach."""
-    rho = np.empty((len(sections.at), len(offsets)))
+    rho = np.full((len(sections.at), len(offsets)), -1.0)
     for i in range(rho.shape[0]):
         for j in range(rho.shape[1]):
             y = offsets[j]
-            inside = sections.reach[i, 0] <= y <= sections.reach[i, 1]
-            rho[i, j] = clearance_at(ground, sections, i, y) if inside else -1.0
+            if sections.reach[i, 0] <= y <= sections.reach[i, 1]:
+                rho[i, j] = clearance_at(ground, sections, i, y)
     return rho
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def follow_branch(
-    rho: F64, offsets: F64, spacing_m: F64, start: float, liked: F64, liking: float, demand: Demand, turn: float
-) -> tuple[F64, F64]:
-    """Return the best connected branch of ridges, shape (n,) [m], and its clearances, shape (n,).
+def encounters(sections: Sections, offsets: F64, robot: F64, speed_m_s: float, horizon_s: float, closing: F64) -> F64:
+    """Return how near what closes in will be at every station and offset when the robot gets there, shape (n, m) [m].
+
+    Args:
+        sections: from the robot's own on.
+        offsets: shape (m,).
+        robot: in odom, shape (2,).
+        speed_m_s: that arrivals are expected at.
+        horizon_s: how far it is extrapolated.
+        closing: middle, velocity and number of cells of the boundary, shape (5,).
+    """
+    apart = np.full((len(sections.at), len(offsets)), np.inf)
+    if closing[4] == 0.0:
+        return apart
+    for i in range(len(sections.at)):
+        for j in range(len(offsets)):
+            x = sections.at[i, 0] + offsets[j] * sections.normal[i, 0]
+            y = sections.at[i, 1] + offsets[j] * sections.normal[i, 1]
+            h = min(np.hypot(x - robot[0], y - robot[1]) / speed_m_s, horizon_s)
+            for k in range(3):
+                t = h * (0.7 + 0.3 * k)
+                there = np.hypot(x - closing[0] - closing[2] * t, y - closing[1] - closing[3] * t) - BODY_M
+                apart[i, j] = min(apart[i, j], there)
+    return apart
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def station_costs(rho: F64, apart: F64, offsets: F64, demand: Demand) -> F64:
+    """Return what it costs to pass each station at each offset, shape (n, m), in metres of clearance missed.
+
+    Args:
+        rho: predicted clearances, shape (n, m).
+        apart: distances to what closes in, on arrival, shape (n, m).
+        offsets: shape (m,).
+        demand: what a station must have.
+    """
+    cost = np.empty(rho.shape)
+    for i in range(rho.shape[0]):
+        for j in range(rho.shape[1]):
+            short = max(0.0, demand.least_m - rho[i, j])
+            cost[i, j] = -worth(min(rho[i, j], apart[i, j]), offsets[j], demand) + 20.0 * short + (5.0 if short > 0.0 else 0.0)
+            cost[i, j] += 3.0 * max(0.0, demand.least_m - apart[i, j])
+    return cost
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def cheapest_branch(costs: F64, offsets: F64, spacing_m: F64, start: float, turn: float) -> tuple[F64, float]:
+    """Return the branch that costs least, shape (n,) [m], and what it costs.
 
     A station's best offset taken alone would hop between the two sides of an obstacle from one station to the next; so the
     branch is chosen as a whole, by dynamic programming over stations and offsets.
 
     Args:
-        rho: clearances, shape (n, m).
-        offsets: of the samples, shape (m,).
+        costs: of every station and offset, shape (n, m).
+        offsets: shape (m,).
         spacing_m: between stations, shape (n - 1,).
         start: offset of the robot at the first station.
-        liked: offset followed so far, shape (n,); NaN where there was none.
-        liking: clearance that a metre off it costs.
-        demand: what a station must have.
         turn: cost of a squared slope, per metre.
     """
-    n, m = rho.shape
-    cost, came = np.empty((n, m)), np.zeros((n, m), np.int64)
-    for i in range(n):
+    n, m = costs.shape
+    total, came = np.empty((n, m)), np.zeros((n, m), np.int64)
+    for j in range(m):
+        total[0, j] = costs[0, j] + AWAY * (offsets[j] - start) ** 2
+    for i in range(1, n):
         for j in range(m):
-            short = max(0.0, demand.least_m - rho[i, j])
-            here = -worth(rho[i, j], offsets[j], demand) + 20.0 * short + (5.0 if short > 0.0 else 0.0)
-            if np.isfinite(liked[i]):
-                here += liking * abs(offsets[j] - liked[i])
-            if i == 0:
-                cost[0, j] = here + 4.0 * (offsets[j] - start) ** 2
-                continue
             best, before = np.inf, 0
             for k in range(m):
-                slope = (offsets[j] - offsets[k]) / spacing_m[i - 1]
-                total = cost[i - 1, k] + turn * slope * slope * spacing_m[i - 1]
-                if total < best:
-                    best, before = total, k
-            cost[i, j], came[i, j] = best + here, before
-    y, clearance = np.empty(n), np.empty(n)
-    j = int(np.argmin(cost[n - 1]))
+                step = offsets[j] - offsets[k]
+                value = total[i - 1, k] + turn * step * step / spacing_m[i - 1]
+                if value < best:
+                    best, before = value, k
+            total[i, j], came[i, j] = best + costs[i, j], before
+    y = np.empty(n)
+    j = int(np.argmin(total[n - 1]))
+    least = total[n - 1, j]
     for back in range(n):
-        i = n - 1 - back
-        y[i], clearance[i] = offsets[j], rho[i, j]
-        j = came[i, j]
-    return y, clearance
+        y[n - 1 - back] = offsets[j]
+        j = came[n - 1 - back, j]
+    return y, least
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def cost_along(costs: F64, offsets: F64, spacing_m: F64, start: float, turn: float, y: F64) -> float:
+    """Return what a branch, shape (n,), costs, as `cheapest_branch` counts."""
+    n, m = costs.shape
+    total, before = 0.0, 0
+    for i in range(n):
+        j = int(min(max(np.rint((y[i] - offsets[0]) / (offsets[1] - offsets[0])), 0.0), m - 1.0))
+        total += costs[i, j]
+        if i == 0:
+            total += AWAY * (offsets[j] - start) ** 2
+        else:
+            step = offsets[j] - offsets[before]
+            total += turn * step * step / spacing_m[i - 1]
+        before = j
+    return total
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -63,9 +63,7 @@ class TrackerSettings(Settings):
     hysteresis: float = Field(
         default=0.3, ge=0.0, le=10.0, description="clearance that a metre off the predicted offset must gain"
     )
-    switch_gain_m: float = Field(
-        default=0.10, ge=0.0, le=2.0, description="least clearance gained by another branch worth the switch"
-    )
+    switch_gain_m: float = Field(default=0.05, ge=0.0, le=2.0, description="clearance per station that another branch must gain")
     repaired_share: float = Field(
         default=0.3, ge=0.0, le=1.0, description="of the forward stations; fewer repaired: the tube collapsed"
     )
@@ -92,6 +90,9 @@ class ControllerSettings(Settings):
     heading_gain_per_s: float = Field(default=2.0, ge=0.0, le=20.0, description="k_heading")
     heading_look_ahead_m: float = Field(
         default=1.0, gt=0.0, le=10.0, description="the heading is that of the manifold up to here"
+    )
+    view_margin_deg: float = Field(
+        default=35.0, ge=0.0, le=90.0, description="what closes in is kept so far inside the edge of view"
     )
     progress_m_s: float = Field(default=0.10, ge=0.0, le=1.0, description="v_min,progress: anti-freeze floor along the manifold")
     body_m: float = Field(default=0.25, ge=0.0, le=2.0, description="kept from the unknown; nearer cells are stood on already")

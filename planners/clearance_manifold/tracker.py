@@ -19,6 +19,8 @@ from planners.clearance_manifold.ridge_kernels import along_manifold
 from planners.clearance_manifold.settings import SolverSettings, TrackerSettings
 
 SECOND_NS = 1_000_000_000
+PRESSED_M = 0.10  # with less room than this beyond rho_min, other branches are looked at this often
+PRESSED_S = 0.2
 
 
 class Category(enum.Enum):
@@ -123,7 +125,7 @@ class Tracker:
         tube_m = s.tube_m + s.lipschitz_m_s * elapsed_s
         tubes_m = np.full(len(scene.arcs_m), tube_m)
         manifold, duals, repaired, converged = self._solver.repair(scene, prior, tubes_m)
-        if repaired <= s.repaired_share * self._solver_settings.stations_forward:
+        if repaired <= s.repaired_share * (scene.end - own - 1):
             return None, duals, converged, "tube collapsed"
         moved = np.abs(manifold.offset_m - prior.offset_m)[own : own + repaired]
         if moved.max() > self._step_limit_m:
@@ -133,14 +135,12 @@ class Tracker:
         lengths = np.hypot(*along.T) * np.hypot(*was.T)
         if ((along * was).sum(axis=1) < s.tangent_cosine * lengths).any():
             return None, duals, converged, "tangents disagree"
-        if stamp_ns - self._looked_ns >= round(self._solver_settings.skip_s * SECOND_NS):
+        least = float(manifold.clearance_m[manifold.ahead].min()) if manifold.valid else 0.0
+        pressed = least < self._solver.least_m + PRESSED_M
+        wait_s = PRESSED_S if pressed else self._solver_settings.skip_s
+        if stamp_ns - self._looked_ns >= round(wait_s * SECOND_NS):
             self._looked_ns = stamp_ns
-            _, clearance, wide = self._solver.branch(scene, prior.offset_m)
-            stuck = manifold.valid < wide
-            least = float(manifold.clearance_m[manifold.ahead].min())
-            if stuck or (
-                manifold.valid == wide and clearance > least + s.switch_gain_m and least < self._solver.least_m + s.switch_gain_m
-            ):
+            if self._solver.branch(scene, prior.offset_m)[1] > s.switch_gain_m:
                 return None, duals, converged, "better branch"
         return manifold, duals, converged, ""
 

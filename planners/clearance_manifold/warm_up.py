@@ -13,6 +13,8 @@ from estimators.belief import FREE, Belief, ClearanceField, Lattice, OccupancyGr
 from planners.planner import Plan
 from planners.router import Route
 
+SECOND_NS = 1_000_000_000  # apart: long enough for other branches to be looked at
+
 
 class Plans(Protocol):
     """What can be asked for a plan."""
@@ -32,5 +34,5 @@ def rehearse(planner: Plans) -> None:
     grid = OccupancyGrid(lattice, frozen_array(np.full(shape, FREE, np.uint8)))
     path = frozen_array(np.stack((np.linspace(0.0, 2.0, 21), np.zeros(21)), axis=1))
     for tick in range(2):
-        belief = Belief(tick, tick * 50_000_000, SE2(), SE2(), BodyTwist(), np.zeros((3, 3)), grid, field, (), None, 0)
+        belief = Belief(tick, tick * SECOND_NS, SE2(), SE2(), BodyTwist(), np.zeros((3, 3)), grid, field, (), None, 0)
         planner.plan(belief, Route((2.0, 0.0), path, 2.0))

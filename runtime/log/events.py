@@ -12,6 +12,7 @@ from runtime.cycle import Cycle
 from runtime.faults import FaultReport, Response
 from runtime.log import colours
 from runtime.log.layers import Rows
+from runtime.log.leaves import said
 from runtime.log.sink import Sink
 
 EVENTS = "/view/events"
@@ -43,6 +44,7 @@ class Events:
         self._faults: dict[tuple[str, str], FaultReport] = {}
         self._goals: tuple[Goal, ...] | None = None
         self._contacts: tuple[str, ...] = ()
+        self._words: dict[str, str] = {}
 
     def put(self, cycle: Cycle) -> None:
         """Write what is new."""
@@ -51,6 +53,11 @@ class Events:
             self._text.add(tick, Event(rr.TextLogLevel.INFO, f"operator: {_action(event.action)}"))
         for news in self._on_the_way(cycle):
             self._text.add(tick, news)
+        words = {name: value for name, value in said(cycle.plan.diagnostics) if isinstance(value, str)}
+        for name, value in words.items():
+            if value and value != self._words.get(name):
+                self._text.add(tick, Event(rr.TextLogLevel.DEBUG, f"planner: {name.replace('_', ' ')}: {value}"))
+        self._words = words
         faults = {(report.fault.value, report.device): report for report in verdict.faults}
         for key, report in faults.items():
             if key not in self._faults:

@@ -39,7 +39,8 @@ def _scene(header: RunHeader) -> rrb.Spatial3DView:
 
 
 def _clearance() -> rrb.Spatial3DView:
-    shown = [f"{scene.ODOM}/{name}" for name in ("clearance", "plan", "route", "base/body", "base/heading", "tracks/**")]
+    names = ("clearance", "plan", "route", "drawn/**", "base/body", "base/heading", "tracks/**")
+    shown = [f"{scene.ODOM}/{name}" for name in names]
     contents = [*shown, f"{scene.MAP}/movers/**", f"{scene.MAP}/goals", f"{scene.MAP}/trail"]
     return views.scene("Clearance field, from above", scene.MAP, contents, scene.FOCUS, _ABOVE, [f"{scene.MAP}/trail"])
 

@@ -13,6 +13,7 @@ from runtime.cycle import Cycle
 from runtime.keyframes import KeyFrame
 from runtime.log import plots, scene, timing
 from runtime.log.columns import ArrowColumn, timelines
+from runtime.log.drawings import Drawings, planner_drawings, shield_drawings
 from runtime.log.events import Events
 from runtime.log.exact import ExactPart
 from runtime.log.header import SCHEMA_VERSION, RunHeader
@@ -67,6 +68,8 @@ class Writer:
             *plots.layers(header),
             plots.Diagnosed(plots.PLANNER, plots.planner_diagnostics),
             plots.Diagnosed(plots.SHIELD, plots.shield_diagnostics),
+            Drawings("planner", planner_drawings),
+            Drawings("shield", shield_drawings),
             Events(),
             *beside,
         )

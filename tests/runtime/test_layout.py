@@ -7,7 +7,7 @@ import pytest
 from drivers.interface.commands import JointTrajectory
 from drivers.interface.geometry import SE3
 from runtime import configuration
-from runtime.log import plots, scene, timing
+from runtime.log import drawings, plots, scene, timing
 from runtime.log.arm import set_point
 from runtime.log.opening import reader_of
 from runtime.log.read import STATIC, Log, read
@@ -16,7 +16,7 @@ from runtime.run import RunOptions, run
 
 DRIVE = ("dynamic_hallway", "planner.name=point_ds", "estimator.tracks=truth", "mission.time_limit_s=2.0")
 ARM = ("arm_bench", "mission.time_limit_s=1.0")
-ONLY_IF_SAID = {plots.PLANNER, plots.SHIELD, scene.COLOUR}  # not every planner, shield and camera has something to say
+ONLY_IF_SAID = {plots.PLANNER, plots.SHIELD, scene.COLOUR, drawings.DRAWN}  # not each has something to say
 HIDDEN = {"/view/map/truth"}  # logged for those who want to see it; a second trail beside the robot's own would confuse
 
 

@@ -1,0 +1,187 @@
+"""The clearance-manifold planner: what it continues, when it falls back, how well it tracks, and what it does with bad input."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivers.interface.commands import BodyTwist
+from drivers.interface.geometry import SE2
+from estimators.belief import OCCUPIED, UNKNOWN
+from planners.clearance_manifold.planner import ClearanceManifold
+from planners.clearance_manifold.settings import ClearanceManifoldSettings
+from planners.planner import PlannerSetup, no_path
+from planners.router import Route, RouterSetup
+from planners.routers.straight import StraightRouter
+from tests.planners.synthetic import DIFFERENTIAL, OMNI, Box, Disc, belief_of, mission_to
+
+PERIOD_S, RADIUS_M = 0.05, 0.12
+WALLS = (Box(-4, 1.0, 12, 1.2), Box(-4, -1.2, 12, -1.0))
+STRAIGHT = StraightRouter(StraightRouter.Settings(), RouterSetup(PERIOD_S, RADIUS_M))
+
+
+def planner_of(limits=OMNI, **settings):
+    return ClearanceManifold(ClearanceManifoldSettings(**settings), PlannerSetup(PERIOD_S, RADIUS_M, limits, 0))
+
+
+def at(tick, obstacles=WALLS, pose=SE2(), twist=BodyTwist(), **kwargs):  # noqa: B008 - frozen
+    belief = belief_of(obstacles, pose, twist, tick=tick, **kwargs)
+    return replace(belief, stamp_ns=tick * 50_000_000)
+
+
+def routed(belief, goal=(9.0, 0.0)):
+    return belief, STRAIGHT.route(belief, mission_to(*goal))
+
+
+def said(planner, belief, goal=(9.0, 0.0)):
+    return planner.plan(*routed(belief, goal)).diagnostics
+
+
+def test_a_still_corridor_is_continued_with_all_properties():
+    planner = planner_of()
+    told = [said(planner, at(k, pose=SE2(0.025 * k, 0.0, 0.0), twist=BodyTwist(0.5, 0.0, 0.0))) for k in range(12)]
+    assert told[0].fallback_category == "cold_start"
+    assert {d.fallback_category for d in told[1:]} == {"none"}
+    assert all((d.p1, d.p2, d.p3, d.p4, d.p5, d.p6) == (True,) * 6 for d in told[1:])
+    assert told[-1].deviation_m < 0.02
+    assert told[-1].utilisation == pytest.approx(11 / 12)
+    assert told[-1].speed_m_s == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("change", "category", "trigger"),
+    [
+        ({"goal": (5.0, 0.2)}, "task_reset", "goal changed"),
+        ({"pose": SE2(1.2, 0.0, 0.0)}, "sensing_failure", "pose jump"),
+        ({"pose": SE2(0.0, 0.45, 0.0)}, "sensing_failure", "lateral drift"),
+        ({"obstacles": (*WALLS, Box(0.3, -1.0, 0.5, 0.35))}, "regular_continuation_failure", "tube collapsed"),
+    ],
+)
+def test_what_breaks_the_continuation_is_named(change, category, trigger):
+    planner = planner_of()
+    for tick in range(3):
+        said(planner, at(tick))
+    goal = change.pop("goal", (9.0, 0.0))
+    told = said(planner, at(3, **change), goal)
+    assert (told.fallback_category, told.trigger) == (category, trigger)
+    assert said(planner, at(4, **change), goal).fallback_category == "none"  # and it goes on from there
+
+
+def test_without_continuation_every_tick_is_a_failure_to_continue():
+    planner = planner_of(tracker={"enabled": False})
+    told = [said(planner, at(tick)) for tick in range(4)]
+    assert [d.tracking for d in told] == [False] * 4
+    assert told[-1].fallback_category == "regular_continuation_failure"
+
+
+def test_the_manifold_goes_around_what_stands_in_the_way_and_stays_in_the_box():
+    planner = planner_of()
+    plan = planner.plan(*routed(at(0, (*WALLS, Disc(2.0, 0.2, 0.3)))))
+    path = plan.path_in_odom
+    gap = np.minimum(np.hypot(path[:, 0] - 2.0, path[:, 1] - 0.2) - 0.3, 1.0 - np.abs(path[:, 1]))
+    assert gap[path[:, 0] < 2.9].min() >= 0.2 - 0.03
+    assert {drawing.name for drawing in plan.drawings} == {"centre_line", "ridge", "box_left", "box_right"}
+
+
+def test_tracking_error_keeps_the_bound_on_a_moving_manifold():
+    """Proposition 2: |e| <= exp(-k t) |e0| + sup v / k, on a corridor that moves sideways."""
+    planner, gain, sideways = planner_of(), 4.0, 0.15
+    pose, error0, worst = SE2(0.0, -0.2, 0.0), None, 0.0
+    for tick in range(80):
+        shift = sideways * tick * PERIOD_S
+        walls = (Box(-4, 1.0 + shift, 12, 1.2 + shift), Box(-4, -1.2 + shift, 12, -1.0 + shift))
+        plan = planner.plan(*routed(at(tick, walls, pose, BodyTwist(0.4, 0.0, 0.0)), (9.0, 0.0)))
+        told, twist = plan.diagnostics, plan.base
+        worst = max(worst, told.bound_m) if tick > 1 else worst
+        error0 = told.error_m if error0 is None else error0
+        assert told.error_m <= math.exp(-gain * tick * PERIOD_S) * error0 + worst + gain * PERIOD_S * worst + 0.01
+        pose = pose.integrate(twist.vx, twist.vy, twist.wz, PERIOD_S)
+
+
+def test_a_differential_base_ends_up_on_the_manifold():
+    """The point ahead of it keeps the bound; the centre is never farther off than that point's error and its distance."""
+    planner, pose, twist = planner_of(DIFFERENTIAL), SE2(0.0, -0.3, 0.3), BodyTwist()
+    ahead_m = ClearanceManifoldSettings().controller.look_ahead_m
+    walls = (Box(-4, 0.6, 12, 1.2), Box(-4, -1.2, 12, -0.6))
+    for tick in range(120):
+        plan = planner.plan(*routed(at(tick, walls, pose, twist)))
+        twist = plan.base
+        assert twist.vy == 0.0
+        point = np.array([pose.x, pose.y]) + ahead_m * np.array([math.cos(pose.yaw), math.sin(pose.yaw)])
+        offset = np.interp(point[0], *plan.path_in_odom.T)
+        centre = np.interp(pose.x, *plan.path_in_odom.T)
+        assert abs(pose.y - centre) <= abs(point[1] - offset) + ahead_m + 0.02
+        pose = pose.integrate(twist.vx, 0.0, twist.wz, PERIOD_S)
+    assert abs(pose.y) < 0.05
+    assert pose.x > 1.5
+
+
+def test_a_restored_planner_goes_on_identically():
+    def inputs(tick):
+        return routed(at(tick, (*WALLS, Disc(3.0 - 0.04 * tick, 0.3, 0.25, -0.8, 0.0)), SE2(0.02 * tick, 0.0, 0.0)))
+
+    one, other = planner_of(), planner_of()
+    for tick in range(15):
+        one.plan(*inputs(tick))
+    for tick in range(3):
+        other.plan(*inputs(30 + tick))
+    other.restore(one.snapshot())
+    for tick in range(15, 30):
+        first, second = one.plan(*inputs(tick)), other.plan(*inputs(tick))
+        assert first.base == second.base
+        assert first.diagnostics == second.diagnostics
+        assert first.path_in_odom.tobytes() == second.path_in_odom.tobytes()
+
+
+def filled(belief, label):
+    known = np.full(belief.grid.label.shape, label != UNKNOWN)
+    clearance = np.full(known.shape, 0.0 if label == OCCUPIED else 6.0, np.float32)
+    grid = replace(belief.grid, label=np.full(known.shape, label, np.uint8))
+    return replace(belief, grid=grid, clearance=replace(belief.clearance, clearance_m=clearance, known=known, overlap=known))
+
+
+@pytest.mark.parametrize("limits", [OMNI, DIFFERENTIAL], ids=["omni", "differential"])
+@pytest.mark.parametrize(
+    ("belief", "goal", "reason"),
+    [
+        (at(0, (Disc(0.0, 0.0, 0.5),)), (9.0, 0.0), "inside an obstacle"),
+        (filled(at(0), OCCUPIED), (9.0, 0.0), "inside an obstacle"),
+        (filled(at(0), UNKNOWN), (9.0, 0.0), ""),
+        (at(0, (Box(-4, 0.03, 12, 1.2), Box(-4, -1.2, 12, -0.03))), (9.0, 0.0), "no passage is wide enough here"),
+        (at(0, (Box(0.28, -3, 3, 3),)), (2.0, 0.0), ""),  # the goal lies in a wall right ahead
+    ],
+    ids=["inside", "all occupied", "all unknown", "one cell wide", "goal in a wall"],
+)
+def test_stands_where_there_is_no_safe_way(limits, belief, goal, reason):
+    planner = planner_of(limits)
+    plan = planner.plan(*routed(belief, goal))
+    assert plan.base.finite
+    assert plan.base.vx <= 0.02
+    assert plan.diagnostics.p6
+    assert reason in plan.diagnostics.stopped
+
+
+@pytest.mark.parametrize("blocked", [True, False])
+def test_refuses_without_a_route(blocked):
+    plan = planner_of().plan(at(0), Route(None if not blocked else (3.0, 0.0), no_path(), 0.0, blocked))
+    assert plan.base == BodyTwist()
+    assert plan.diagnostics.stopped == ("the way is blocked" if blocked else "no goal")
+
+
+@pytest.mark.parametrize("limits", [OMNI, DIFFERENTIAL], ids=["omni", "differential"])
+def test_turns_to_a_goal_behind_before_it_drives_into_what_it_has_not_seen(limits):
+    planner, pose, twist = planner_of(limits), SE2(), BodyTwist()
+    for tick in range(200):
+        belief = at(tick, (), pose, twist, fov_rad=math.radians(87.0))
+        twist = planner.plan(*routed(belief, (-3.0, 0.02))).base
+        if abs(pose.yaw) < math.pi / 2:
+            assert math.hypot(pose.x, pose.y) < 0.3
+        pose = pose.integrate(twist.vx, twist.vy, twist.wz, PERIOD_S)
+    assert pose.x < -1.0
+
+
+def test_an_empty_grid_is_no_obstacle():
+    plan = planner_of().plan(*routed(at(0, ())))
+    assert plan.base.vx > 0.3
+    assert plan.diagnostics.p1
