@@ -19,6 +19,7 @@ class EstimatorSetup:
     robot_radius_m: float
     map_from_start: SE2
     kinematics: WheelKinematics | None  # None: a robot without a base
+    imu_in_base_m: tuple[float, float] = (0.0, 0.0)  # where the inertial unit sits, forward and to the left
 
 
 @runtime_checkable

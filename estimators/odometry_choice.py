@@ -29,12 +29,12 @@ class OdometrySettings(DeadReckoningSettings):
     gyro_bias_rad_s: float = Field(default=0.0, ge=-1.0, le=1.0, description="as calibrated: true rate = scale * gyro - bias")
     gyro_scale: float = Field(default=1.0, ge=0.5, le=2.0, description="as calibrated")
     wheels_late_s: float = Field(default=0.0, ge=-0.1, le=0.1, description="as calibrated: of their stamps, against the gyro's")
-    imu_x_m: float = Field(default=0.0, ge=-2.0, le=2.0, description="where the inertial unit sits in base; it feels turns there")
-    imu_y_m: float = Field(default=0.0, ge=-2.0, le=2.0, description="likewise, to the left")
     ekf: EkfSettings = EkfSettings()
 
 
-def build_odometry(settings: OdometrySettings, kinematics: WheelKinematics | None) -> Odometry:
+def build_odometry(
+    settings: OdometrySettings, kinematics: WheelKinematics | None, imu_in_base_m: tuple[float, float] = (0.0, 0.0)
+) -> Odometry:
     """Return the odometry that the settings name; a calibrated geometry takes the place of the base's own `kinematics`."""
     if settings.geometry is not None:
         kinematics = settings.geometry.kinematics
@@ -48,8 +48,7 @@ def build_odometry(settings: OdometrySettings, kinematics: WheelKinematics | Non
         settings.gyro_bias_rad_s,
         settings.gyro_scale,
         settings.wheels_late_s,
-        settings.imu_x_m,
-        settings.imu_y_m,
+        *imu_in_base_m,
     )
     trail_s, beyond_s = settings.trail_s, settings.extrapolation_max_s
     return EkfOdometry(settings.ekf, limits, kinematics, trail_s=trail_s, extrapolation_max_s=beyond_s)

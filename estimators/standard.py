@@ -229,4 +229,4 @@ def _odometry_of(settings: StandardSettings, setup: EstimatorSetup) -> Odometry:
     odometry = settings.odometry
     if settings.pose == "truth":
         return TruthOdometry(setup.map_from_start, odometry.trail_s, odometry.extrapolation_max_s)
-    return build_odometry(odometry, setup.kinematics)
+    return build_odometry(odometry, setup.kinematics, setup.imu_in_base_m)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from drivers.interface.commands import Command
+from drivers.interface.devices import Mounted
 from drivers.interface.geometry import SE2
 from drivers.interface.sensed import Sensed, Tick
 from estimators.estimator import Estimator, EstimatorSetup
@@ -68,6 +69,7 @@ def build_parts(configuration: Configuration, seed: int, devices: Devices, map_f
     limits = devices.base.limits if devices.base else None
     kinematics = devices.base.kinematics if devices.base else None
     arm_limits = devices.arm.limits if devices.arm else None
+    imu_in_base_m = devices.imu.place_in_base_m if isinstance(devices.imu, Mounted) else (0.0, 0.0)
 
     planning = configuration.planner
     plan_period_s = period_s * planning.common.period_ticks
@@ -76,7 +78,7 @@ def build_parts(configuration: Configuration, seed: int, devices: Devices, map_f
     budget_ns = configuration.loop.period_ns if planning.common.budget_ms is None else round(planning.common.budget_ms * 1e6)
     supervisor_setup = SupervisorSetup(period_s, limits, budget_ns, devices.operator is not None, arm_limits)
     return Parts(
-        estimator=configuration.estimator.build(EstimatorSetup(period_s, radius_m, map_from_start, kinematics)),
+        estimator=configuration.estimator.build(EstimatorSetup(period_s, radius_m, map_from_start, kinematics, imu_in_base_m)),
         router=configuration.router.build(RouterSetup(period_s, radius_m)),
         planner=planner,
         runner=PlannerRunner(

@@ -56,6 +56,11 @@ class SimImu(SimSensor[ImuSample]):
         self._acceleration = np.zeros(3)
         self._acted_ns = -1
 
+    @property
+    def place_in_base_m(self) -> tuple[float, float]:
+        """Where it sits [m]."""
+        return self._settings.x_m, self._settings.y_m
+
     def build(self, spec: Any, base: Any) -> None:
         """Mark its place on the base."""
         base.add_site(name=f"{self._setup.name}_imu", pos=[self._settings.x_m, self._settings.y_m, self._settings.z_m])

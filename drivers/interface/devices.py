@@ -165,6 +165,16 @@ class Imu(Device, Protocol):
 
 
 @runtime_checkable
+class Mounted(Protocol):
+    """An inertial unit that knows where on the robot it sits: turning, its accelerometer feels more than the base does."""
+
+    @property
+    def place_in_base_m(self) -> tuple[float, float]:
+        """Where it sits, forward and to the left of the base's origin [m]."""
+        ...
+
+
+@runtime_checkable
 class RangeScanner(Device, Protocol):
     """A planar range scanner."""
 

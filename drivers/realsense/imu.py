@@ -18,7 +18,7 @@ from drivers.realsense.settings import ImuSettings
 class RealSenseImu:
     """Gyroscope and accelerometer inside a RealSense, turned into base; with a camera of the same source it shares the process.
 
-    Its samples are those of the place where the camera is: no lever arm is taken out.
+    Its samples are those of the place where the camera is; who estimates takes the lever arm out (`place_in_base_m`).
     """
 
     Settings: ClassVar[type[Settings]] = ImuSettings
@@ -33,6 +33,11 @@ class RealSenseImu:
         self._base_from_optical = (mount @ BODY_FROM_OPTICAL).rotation  # (3, 3)
         self._clock = HostClock(setup.now_ns)
         self._lease = link_of(settings, setup)
+
+    @property
+    def place_in_base_m(self) -> tuple[float, float]:
+        """Where it sits [m]."""
+        return self._settings.x_m, self._settings.y_m
 
     def open(self) -> None:
         """Start the camera and wait for what it sends first.

@@ -22,6 +22,9 @@ class SourceSettings(Settings):
     connect_s: float = Field(default=5.0, gt=0.1, le=60.0, description="until the first frame must have come")
     silent_s: float = Field(default=0.5, gt=0.05, le=10.0, description="without a frame for so long the camera is lost")
     latency_s: float = Field(default=0.03, ge=0.0, le=0.5, description="from capture to the arrival of the fastest frames")
+    x_m: float = Field(default=0.1, ge=-2.0, le=2.0, description="mount of the camera's body (x forward, y left, z up) in base")
+    y_m: float = Field(default=0.0, ge=-2.0, le=2.0, description="mount in base")
+    z_m: float = Field(default=0.4, ge=0.0, le=3.0, description="mount above the floor")
     roll_rad: float = Field(default=0.0, ge=-math.pi, le=math.pi, description="mount about x")
     pitch_rad: float = Field(default=0.0, ge=-math.pi / 2, le=math.pi / 2, description="mount about y; positive looks down")
     yaw_rad: float = Field(default=0.0, ge=-math.pi, le=math.pi, description="mount about z")
@@ -52,9 +55,6 @@ class CameraSettings(SourceSettings):
     filters: FilterSettings = FilterSettings()
     colour_rate_hz: float = Field(default=0.0, ge=0.0, le=10.0, description="JPEG pictures a second, for the log; 0: none")
     jpeg_quality: int = Field(default=70, ge=1, le=100, description="of the pictures")
-    x_m: float = Field(default=0.1, ge=-2.0, le=2.0, description="mount of the camera's body (x forward, y left, z up) in base")
-    y_m: float = Field(default=0.0, ge=-2.0, le=2.0, description="mount in base")
-    z_m: float = Field(default=0.4, ge=0.0, le=3.0, description="mount above the floor")
 
 
 class ImuSettings(SourceSettings):

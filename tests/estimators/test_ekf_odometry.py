@@ -264,12 +264,13 @@ def test_the_place_of_the_inertial_unit_is_taken_into_account():
     drive = Drive(OMNI, STILL + turns)
     away = offset(drive, 0.3, -0.2)
 
-    def worst(**how):
+    def worst(imu_in_base_m):
         # Few wheel samples, or they would outweigh what the accelerometer says.
-        estimates = feed(ekf(**how), away, drive.wheels[::20], drive.end_ns)
+        odometry = build_odometry(OdometrySettings(kind="ekf"), OMNI, imu_in_base_m)
+        estimates = feed(odometry, away, drive.wheels[::20], drive.end_ns)
         return max(math.hypot(e.twist.vx, e.twist.vy) for e in estimates)
 
-    assert worst(imu_x_m=0.3, imu_y_m=-0.2) < 0.2 * worst()
+    assert worst((0.3, -0.2)) < 0.2 * worst((0.0, 0.0))
 
 
 def test_ten_minutes_of_standing_and_driving_does_not_diverge_and_a_broken_gyro_does():
