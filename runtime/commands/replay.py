@@ -25,14 +25,18 @@ def replay(
     force: Annotated[bool, typer.Option("--force", help="overwrite an existing log")] = False,
 ) -> None:
     """Run the loop again over a recording: 0 it comes to the same, 1 it does not, 2 it cannot be replayed."""
-    from runtime.log.opening import require_log
     from runtime.outputs import log_path, require_writable, write_text
+    from runtime.replay.damage import damage_of
     from runtime.replay.recording import Recording
     from runtime.replay.replay import ReplayOptions
     from runtime.replay.replay import replay as run_again
 
     require_writable(json, "--json")
-    require_log(log)  # before anything is overwritten
+    damage = damage_of(log)  # before Rerun's reader meets it, and before anything is overwritten
+    for sentence in damage.sentences:
+        console.print(sentence, markup=False, highlight=False, soft_wrap=True)
+    if not damage.is_readable:
+        raise typer.Exit(1)
     if output is not None and output.resolve() == log.resolve():
         raise ConfigurationError(f"--log {output} is the log that is to be replayed")
     path = None if output is None else log_path(output, "", force=force)
@@ -43,4 +47,4 @@ def replay(
         console.print(sentence, markup=False, highlight=False, soft_wrap=True)
     if json is not None:
         write_text(json, report.json())
-    raise typer.Exit(report.exit_code)
+    raise typer.Exit(1 if damage.is_altered else report.exit_code)

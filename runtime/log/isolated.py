@@ -13,7 +13,7 @@ from typing import Any
 
 from drivers.interface.errors import ConfigurationError
 from runtime.log.description import Description, describe
-from runtime.log.opening import require_recording
+from runtime.log.opening import DamagedLogError, require_recording
 from runtime.log.paths import files_of
 from runtime.log.verification import Verification, verify
 
@@ -24,7 +24,8 @@ def verified(log: Path) -> Verification:
     """Return what `verify` finds.
 
     Raises:
-        ConfigurationError: the log will not do.
+        DamagedLogError: the log cannot be read as it is.
+        ConfigurationError: it is none of ours.
     """
     found = _found("verify", log)
     lists = {name: tuple(found[name]) for name in ("damaged", "gaps", "findings")}
@@ -50,9 +51,9 @@ def _found(what: str, log: Path) -> dict[str, Any]:
         said: dict[str, Any] = json.loads(done.stdout)
     except json.JSONDecodeError as error:
         advice = f"`trundle log repair {log}` saves what can be read"
-        raise ConfigurationError(f"the log {log} is damaged so that Rerun's reader gave up; {advice}") from error
+        raise DamagedLogError(f"the log {log} is damaged so that Rerun's reader gave up; {advice}") from error
     if "error" in said:
-        raise ConfigurationError(said["error"])
+        raise (DamagedLogError if said["damaged"] else ConfigurationError)(said["error"])
     return said
 
 
@@ -60,7 +61,7 @@ def _main(what: str, log: str) -> None:
     try:
         said = asdict(_CALLS[what](Path(log)))
     except ConfigurationError as error:
-        said = {"error": str(error)}
+        said = {"error": str(error), "damaged": isinstance(error, DamagedLogError)}
     print(json.dumps(said))
 
 

@@ -18,6 +18,10 @@ from runtime.log.recording import APPLICATION
 RUN = "/run"  # what holds for the whole run
 
 
+class DamagedLogError(ConfigurationError):
+    """A log of ours that cannot be read as it is."""
+
+
 def require_recording(path: Path) -> None:
     """Check that a file can be read and looks like a Rerun recording.
 
@@ -56,7 +60,7 @@ def require_log(path: Path) -> None:
 def _require_schema(path: Path) -> None:
     version = schema_of(path)
     if version is None:
-        raise ConfigurationError(f"the log {path} does not say which schema it has: it was cut off before that, or damaged")
+        raise DamagedLogError(f"the log {path} does not say which schema it has: it was cut off before that, or damaged")
     if version not in READABLE_SCHEMAS:
         known = ", ".join(str(known) for known in READABLE_SCHEMAS)
         raise ConfigurationError(f"the log {path} has schema {version}; this version of trundle reads {known}")
@@ -104,6 +108,6 @@ def reader_of(path: Path) -> RrdReader:
         return RrdReader(path)
 
 
-def _damaged(path: Path, error: Exception) -> ConfigurationError:
+def _damaged(path: Path, error: Exception) -> DamagedLogError:
     reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-    return ConfigurationError(f"the log {path} is cut or damaged ({reason}); `trundle log repair {path}` saves what can be read")
+    return DamagedLogError(f"the log {path} is cut or damaged ({reason}); `trundle log repair {path}` saves what can be read")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,10 +11,10 @@ from runtime.log.marks import END, SEGMENT, End
 from runtime.log.opening import require_log
 from runtime.log.paths import files_of
 from runtime.log.read import STATIC, read_file
+from runtime.log.seal import crc32_of
 from runtime.log.stream import rows
 
 _TICK = "/replay/sensed/tick"
-_BLOCK_BYTES = 1 << 22
 _SHOWN = 5  # ticks that a sentence names; the others are counted
 
 
@@ -88,7 +87,7 @@ def _wrong_with_files(files: Sequence[_File]) -> Iterator[str]:
     for file in files:
         if file.end is None:
             yield f"{file.path.name} has no end: its writer was killed, or it was cut off"
-        elif _crc32(file.path, file.end.bytes) != file.end.crc32:
+        elif crc32_of(file.path, file.end.bytes) != file.end.crc32:
             yield f"{file.path.name} is not as it was written"
     end = files[-1].end
     if end is not None and not end.is_last:
@@ -111,12 +110,3 @@ def _about_ticks(files: Sequence[_File], ticks: Sequence[int], damaged: Sequence
 def _listed(numbers: Sequence[int]) -> str:
     more = f" and {len(numbers) - _SHOWN} more" if len(numbers) > _SHOWN else ""
     return ", ".join(str(number) for number in numbers[:_SHOWN]) + more
-
-
-def _crc32(path: Path, size: int) -> int:
-    """Return the CRC-32 of the first bytes of a file."""
-    crc32 = 0
-    with path.open("rb") as file:
-        while size > 0 and (block := file.read(min(size, _BLOCK_BYTES))):
-            crc32, size = zlib.crc32(block, crc32), size - len(block)
-    return crc32

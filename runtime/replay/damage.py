@@ -1,0 +1,61 @@
+"""What is wrong with a log, said before Rerun's reader meets it: on some flipped bits that reader ends the whole process."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from drivers.interface.errors import ConfigurationError
+from runtime.log.exact import CHECK
+from runtime.log.isolated import verified
+from runtime.log.opening import DamagedLogError, require_log, require_recording
+from runtime.log.paths import files_of
+from runtime.log.repair import repair
+from runtime.log.seal import Seal, seal_of
+from runtime.log.times import starts_ns
+from runtime.log.verification import Verification
+
+
+@dataclass(frozen=True, slots=True)
+class Damage:
+    """What is wrong with a log."""
+
+    sentences: tuple[str, ...] = ()
+    is_altered: bool = False  # since it was written; a log whose writer was killed is not
+    is_readable: bool = True  # the reader does without what is damaged
+
+
+def damage_of(log: Path) -> Damage:
+    """Return what is wrong with a log; a sum over its bytes tells that nothing is, only else is it read in another process.
+
+    Raises:
+        ConfigurationError: it is not a log of ours, or of another schema.
+    """
+    files = files_of(log)
+    for file in files:
+        require_recording(file)
+    seals = set(map(seal_of, files))
+    if seals == {Seal.WHOLE}:
+        require_log(files[0])
+        return Damage()
+    try:
+        return Damage(verified(log).findings, is_altered=Seal.BROKEN in seals)
+    except DamagedLogError as error:
+        return Damage((f"{error}; {_first_damaged(log)}",), is_altered=True, is_readable=False)
+
+
+def _first_damaged(log: Path) -> str:
+    """Say which tick is the first that cannot be read, by what can be saved of the log."""
+    with TemporaryDirectory() as folder:
+        try:
+            saved = repair(log, Path(folder) / "saved.rrd")
+            found = verified(saved)
+        except ConfigurationError:
+            return "which tick is the first damaged one cannot be told"
+        return f"the first tick that is damaged or missing is {_first_of(found, sorted(starts_ns(saved, CHECK)))}"
+
+
+def _first_of(found: Verification, ticks: list[int]) -> int:
+    before_gaps = (max((tick for tick in ticks if tick < gap), default=-1) + 1 for gap in found.gaps)
+    return min((*found.damaged, *before_gaps), default=found.last_tick + 1)
