@@ -59,3 +59,39 @@ def longitudinal(u_x: float, u_y: float, t_x: float, t_y: float, speed: float, c
     elif t_y < -1e-9:
         k = min(k, (-cap_y - u_y) / t_y)
     return max(k, 0.0)
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def give_way(u: F64, robot: F64, closing: F64, apart_m: float, horizon_s: float, side: F64) -> F64:
+    """Return the velocity nearest to u, shape (2,), with which what closes in passes at `apart_m` if it goes on as it does.
+
+    Standing still, the robot would be missed by the vector m after the time t of closest approach; with u . m / |m| <=
+    (|m| - apart) / t it is missed by enough: it does not cross in front of who crosses before it.
+
+    Args:
+        u: velocity in odom [m/s].
+        robot: in odom, shape (2,).
+        closing: middle, velocity and number of cells of the boundary, shape (5,).
+        apart_m: between the middle and the robot's centre.
+        horizon_s: later encounters do not count.
+        side: where to go when it comes straight on, shape (2,), unit.
+    """
+    speed2 = closing[2] * closing[2] + closing[3] * closing[3]
+    if closing[4] == 0.0 or speed2 < 0.01:
+        return u
+    x, y = closing[0] - robot[0], closing[1] - robot[1]
+    t = -(x * closing[2] + y * closing[3]) / speed2
+    if not 0.0 < t < horizon_s:
+        return u
+    miss_x, miss_y = x + closing[2] * t, y + closing[3] * t
+    miss = np.hypot(miss_x, miss_y)
+    if miss < 0.1:
+        miss_x, miss_y = -side[0], -side[1]
+        length = 1.0
+    else:
+        length = miss
+    n_x, n_y = miss_x / length, miss_y / length
+    excess = u[0] * n_x + u[1] * n_y - (miss - apart_m) / max(t, 0.5)
+    if excess <= 0.0:
+        return u
+    return np.array([u[0] - excess * n_x, u[1] - excess * n_y])

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from drivers.interface.commands import BaseLimits, BodyTwist
 from drivers.interface.geometry import SE2, wrap_angle
 from estimators.belief import F64
-from planners.clearance_manifold.control_kernels import brakable, longitudinal
+from planners.clearance_manifold.control_kernels import brakable, give_way, longitudinal
 from planners.clearance_manifold.settings import ControllerSettings
 from planners.point_ds.kernels import within
 
+LEFT = np.array([0.0, 1.0])
 STANDSTILL_M_S = 0.01  # a base that cannot strafe turns on the spot below this
 
 
@@ -26,6 +29,8 @@ class Situation:
     free_m: float  # how far ahead it may go at most
     heading_rad: float  # where the robot should look, in odom
     feasible: bool
+    robot: F64  # (2,), the point that is controlled, in odom
+    closing: F64  # (5,), what closes in
 
 
 class ManifoldController:
@@ -54,14 +59,22 @@ class ManifoldController:
         if at.feasible and speed + float(push @ tangent) < s.progress_m_s:
             speed = min(s.progress_m_s, brakable(at.free_m, s.deceleration_m_s2, s.delay_s))
         if not self._limits.holonomic:
-            return self._look_ahead_twist(push + speed * tangent, self.turn(at, yaw)), speed
-        cap_y = cap.vy
+            u = self._yielding(push + speed * tangent, at, body)
+            return self._look_ahead_twist(u, self.turn(at, yaw)), speed
         low_x = -cap.vx if self._limits.reverse else 0.0
-        push_x, push_y = within(float(push[0]), float(push[1]), low_x if low_x < 0.0 else -1e-9, cap.vx, cap_y)
-        k = longitudinal(push_x, push_y, float(tangent[0]), float(tangent[1]), speed, cap.vx, cap_y, low_x)
-        vx, vy = push_x + k * float(tangent[0]), push_y + k * float(tangent[1])
-        vx, vy = min(max(vx, low_x), cap.vx), min(max(vy, -cap_y), cap_y)
-        return BodyTwist(vx, vy, self.turn(at, yaw)), k
+        push_x, push_y = within(float(push[0]), float(push[1]), low_x if low_x < 0.0 else -1e-9, cap.vx, cap.vy)
+        k = longitudinal(push_x, push_y, float(tangent[0]), float(tangent[1]), speed, cap.vx, cap.vy, low_x)
+        u = self._yielding(np.array([push_x, push_y]) + k * tangent, at, body)
+        vx, vy = within(float(u[0]), float(u[1]), low_x if low_x < 0.0 else -1e-9, cap.vx, cap.vy)
+        return BodyTwist(max(vx, low_x), vy, self.turn(at, yaw)), k
+
+    def _yielding(self, u: F64, at: Situation, body: SE2) -> F64:
+        """Return the velocity, shape (2,), in the body frame, changed so that what closes in passes at a distance."""
+        s = self._settings
+        away = -at.error / max(float(np.hypot(*at.error)), 1e-9) if float(np.hypot(*at.error)) > 1e-6 else body.apply(LEFT)
+        odom = body.inverse()
+        yielding = give_way(odom.apply(u), at.robot, at.closing, s.yield_m, s.yield_horizon_s, away)
+        return body.apply(yielding)
 
     def turn(self, at: Situation, yaw: float) -> float:
         """Return wz towards the heading wanted."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,14 +51,10 @@ class Manifold:
         """Its valid stations from the robot's own on."""
         return slice(self.own, self.own + self.valid)
 
-    def tangents(self) -> F64:
-        """Return unit tangents at the stations, shape (n, 2)."""
-        along = np.gradient(self.points, self.arcs_m, axis=0)
-        return np.asarray(along / np.maximum(np.hypot(along[:, 0], along[:, 1]), 1e-9)[:, None])
-
-    def offsets_at(self, arcs_m: F64) -> F64:
-        """Return y* at arc lengths, shape (m,); its end values beyond its ends."""
-        return np.interp(arcs_m, self.arcs_m, self.offset_m)
+    def tangent(self) -> F64:
+        """Return the unit tangent at the robot's own station, shape (2,)."""
+        along = self.points[self.own + 1] - self.points[self.own - 1]
+        return np.asarray(along / max(math.hypot(along[0], along[1]), 1e-9))
 
 
 def points_of(sections: Sections, offset_m: F64) -> F64:

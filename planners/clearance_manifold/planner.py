@@ -178,7 +178,7 @@ class ClearanceManifold:
     def _situation(self, told: Continuation, belief: Belief, point: F64, closing: F64) -> Situation:
         """Project the robot onto the manifold and read what the controller needs."""
         manifold, own, s = told.manifold, self._stations.own, self._settings.controller
-        tangent = manifold.tangents()[own]
+        tangent = manifold.tangent()
         off = point - manifold.points[own]
         error = off - float(off @ tangent) * tangent
         clearance = manifold.clearance_m[manifold.ahead]
@@ -193,6 +193,8 @@ class ClearanceManifold:
             free_m=self._free_length(manifold, belief),
             heading_rad=self._look(heading(manifold.points[own : own + look]), closing, point),
             feasible=manifold.valid > 1,
+            robot=point,
+            closing=closing,
         )
 
     def _look(self, along_rad: float, closing: F64, point: F64) -> float:

@@ -63,11 +63,6 @@ class ArrivalField:
         return Predicted(distance_to(free == 0, cell_m), closing, arrival.speed_m_s)
 
     @property
-    def confidence(self) -> F32:
-        """How sure each cell's observation still is, 0 to 1, shape (rows, columns)."""
-        return np.asarray(np.exp(-self._age_s / np.float32(self._settings.confidence_decay_s)), np.float32)
-
-    @property
     def age_s(self) -> F32:
         """How long ago each cell was last in view [s], shape (rows, columns)."""
         return self._age_s

@@ -79,7 +79,7 @@ def nearest_closing(clearance: F32, rate: F32, corner: F64, cell_m: float, robot
     for row in range(1, rows - 1):
         for column in range(1, columns - 1):
             change = rate[row, column]
-            if abs(change) < closing_m_s or not 0.0 < clearance[row, column] <= 5.0 * cell_m:
+            if change == 0.0 or abs(change) < closing_m_s or not 0.0 < clearance[row, column] <= 5.0 * cell_m:
                 continue
             at[found, 0], at[found, 1] = row, column
             found += 1

@@ -91,6 +91,10 @@ class ControllerSettings(Settings):
     heading_look_ahead_m: float = Field(
         default=1.0, gt=0.0, le=10.0, description="the heading is that of the manifold up to here"
     )
+    yield_m: float = Field(
+        default=0.60, ge=0.0, le=3.0, description="between the robot and the middle of what closes in; 0: it does not yield"
+    )
+    yield_horizon_s: float = Field(default=2.5, gt=0.0, le=10.0, description="later encounters are not yielded to")
     view_margin_deg: float = Field(
         default=35.0, ge=0.0, le=90.0, description="what closes in is kept so far inside the edge of view"
     )
