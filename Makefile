@@ -18,11 +18,14 @@ help:  ## list the targets
 demo: $(STAMP)  ## drive the omni robot through the dynamic hallway and record it
 	$(BIN)/trundle run dynamic_hallway
 
-picture: $(STAMP)  ## make the README's picture (needs a Vulkan driver; a software one will do)
+picture: $(STAMP)  ## make the README's pictures (needs a Vulkan driver; a software one will do)
 	$(BIN)/trundle run dynamic_hallway --seed 1 --log runs/picture.rrd --force
 	$(BIN)/trundle review runs/picture.rrd --at 212 --screenshot docs/dynamic_hallway.png
 	$(BIN)/trundle run dynamic_hallway --seed 1 --realtime --set loop.rate_hz=40 --log runs/late.rrd --force
 	$(BIN)/trundle review runs/late.rrd --at 300 --question late --screenshot docs/why_late.png
+	$(BIN)/trundle run dynamic_hallway --seed 1 --set planner.name=point_ds --log runs/recorded.rrd --force
+	$(BIN)/trundle replay runs/recorded.rrd --planner dwa --log runs/counterfactual.rrd --force || [ $$? -eq 1 ]
+	$(BIN)/trundle review runs/counterfactual.rrd --at 216 --screenshot docs/counterfactual.png
 
 test: lint  ## what CI runs: format, lint, types, layers, tests
 	$(BIN)/python -m pytest -n 2

@@ -25,7 +25,8 @@ from runtime.replay.layout import RECORDED, RECORDED_PLAN, layout
 _BATCH_TICKS = 25
 _TIMEOUT_S = 30.0
 _NAMES = ("recorded: asked", "recorded: sent", "replayed: asked", "replayed: sent")
-_PALETTE = (colours.MOVING, colours.TRUTH, colours.ASKED, colours.SENT)
+_RECORDED_ASKED: colours.Rgb = (64, 200, 200)
+_PALETTE = (_RECORDED_ASKED, colours.TRUTH, colours.ASKED, colours.SENT)
 
 
 class RecordedSide:
@@ -35,7 +36,7 @@ class RecordedSide:
         """Start with no tick."""
         self._row: Row | None = None
         self._own: list[Layer[Any] | plots.Diagnosed] = [
-            Layer(lambda c: c.plan.path_in_odom, scene.path(RECORDED_PLAN, colours.MOVING, 0.02), IDENTICAL),
+            Layer(lambda c: c.plan.path_in_odom, scene.path(RECORDED_PLAN, _RECORDED_ASKED, 0.02), IDENTICAL),
             plots.Diagnosed(f"{RECORDED}/planner", plots.planner_diagnostics),
             plots.Diagnosed(f"{RECORDED}/shield", plots.shield_diagnostics),
         ]
