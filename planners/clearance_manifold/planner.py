@@ -85,6 +85,9 @@ class ClearanceManifold:
         self._chart: Chart | None = None
         self._arc_m = 0.0  # of the robot on the chart
         self._ticks = np.zeros(2, np.int64)  # continued, all
+        self._asked = BodyTwist()  # at the tick before
+        smoothing_s = settings.controller.smoothing_s
+        self._share = 1.0 - math.exp(-setup.period_s / smoothing_s) if smoothing_s > 0.0 else 1.0
 
     def warm_up(self) -> None:
         """Compile every kernel, on a scene of its own."""
@@ -98,6 +101,7 @@ class ClearanceManifold:
         if reason:
             self._chart = None
             self._tracker.reset()
+            self._asked = BodyTwist()
             return Plan(BodyTwist(), diagnostics=ManifoldDiagnostics(stopped=reason))
         pose = belief.odom_from_base
         point = self._control_point(pose)
@@ -107,7 +111,13 @@ class ClearanceManifold:
         told = self._tracker.advance(scene, belief, new_goal)
         situation = self._situation(told, belief, point, predicted.closing)
         twist, speed = self._controller.command(situation, pose.yaw)
-        return self._plan(scene, told, situation, twist, speed)
+        self._asked = self._smoothed(twist)
+        return self._plan(scene, told, situation, self._asked, speed)
+
+    def _smoothed(self, twist: BodyTwist) -> BodyTwist:
+        """Return the twist a share of the way from the one asked before."""
+        last, share = self._asked, self._share
+        return BodyTwist(last.vx + share * (twist.vx - last.vx), last.vy + share * (twist.vy - last.vy), twist.wz)
 
     def _refusal(self, belief: Belief, route: Route) -> str:
         """Return why there is nothing to do, or nothing."""
@@ -283,6 +293,7 @@ class ClearanceManifold:
             goal=np.zeros(2) if chart is None else chart.goal,
             arc_m=self._arc_m,
             ticks=self._ticks,
+            asked=(self._asked.vx, self._asked.vy, self._asked.wz),
             **self._field.state(),
             **self._tracker.state(),
         )
@@ -292,6 +303,7 @@ class ClearanceManifold:
         state = unpack(snapshot)
         self._chart = Chart(state["line"], state["goal"]) if len(state["line"]) else None
         self._arc_m, self._ticks = float(state["arc_m"]), state["ticks"]
+        self._asked = BodyTwist(*state["asked"].tolist())
         self._field.take(state)
         self._tracker.take(state)
 

@@ -182,6 +182,20 @@ def test_turns_to_a_goal_behind_before_it_drives_into_what_it_has_not_seen(limit
 
 
 def test_an_empty_grid_is_no_obstacle():
-    plan = planner_of().plan(*routed(at(0, ())))
-    assert plan.base.vx > 0.3
+    planner = planner_of()
+    for tick in range(12):
+        plan = planner.plan(*routed(at(tick, ())))
+    assert plan.base.vx > 0.45
     assert plan.diagnostics.p1
+
+
+def test_gives_way_behind_who_crosses_instead_of_driving_in_front():
+    """A walker crosses from the right, well ahead: standing would let him pass; going left would meet him."""
+    crossing = Disc(1.3, -0.8, 0.25, -0.6, 0.6)
+    yields, stubborn = planner_of(), planner_of(controller={"yield_m": 0.0})
+    asked = [
+        [planner.plan(*routed(at(tick, (*WALLS, crossing)))).base for tick in range(10)][-1] for planner in (yields, stubborn)
+    ]
+    assert (
+        asked[0].vx + asked[0].vy < 0.0 < asked[1].vx + asked[1].vy
+    )  # along the miss vector, which points ahead and to the left
