@@ -293,7 +293,8 @@ def _ends(column: pa.Array) -> NDArray[np.int64]:
     if column.null_count:
         return np.concatenate(([0], np.cumsum(pc.fill_null(pc.list_value_length(column), 0).to_numpy(), dtype=np.int64)))
     offsets: NDArray[np.int32] = column.offsets.to_numpy()
-    return (offsets - offsets[0]).astype(np.int64)
+    ends: NDArray[np.int64] = (offsets - offsets[0]).astype(np.int64)
+    return ends
 
 
 def _texts(flat: pa.Array) -> list[str]:

@@ -13,8 +13,8 @@ from typing import Literal
 from drivers.interface.geometry import SE2, SE3
 from runtime.log.urdf import Link
 
-SCHEMA_VERSION = 2  # of the replay columns; raised when a reader of the old ones would misread the new
-READABLE_SCHEMAS = (2,)
+SCHEMA_VERSION = 3  # of the replay columns; raised when a reader of the old ones would misread the new
+READABLE_SCHEMAS = (SCHEMA_VERSION,)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,5 @@
 import math
+import zlib
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -7,9 +8,11 @@ import pytest
 from drivers.interface.commands import BodyTwist, JointTrajectory
 from drivers.interface.geometry import SE2
 from drivers.interface.samples import EmergencyStop, OperatorEvent, Stamp
-from drivers.interface.sensed import Sensed
 from planners.planner import Diagnostics, Plan
 from runtime.cycle import Verdict
+from runtime.log.columns import Kind
+from runtime.log.exact import consumed_schemas, decided_schemas
+from runtime.log.header import SCHEMA_VERSION
 from runtime.log.schema import Schema
 from tests.runtime.log_cycles import bits, make_cycles
 
@@ -21,16 +24,16 @@ def row(schema: Schema, tick: int) -> dict[str, list[object]]:
     cells = {}
     for name, column in schema.columns.items():
         start, end = [0, *column.ends][tick], column.ends[tick]
-        cells[name] = column.values[start:end] if name == "depth.depth" else column.flat().to_pylist()[start:end]
+        cells[name] = column.values[start:end] if column.kind is Kind.IMAGE else column.flat().to_pylist()[start:end]
     return cells
 
 
 @pytest.mark.parametrize("cycle", make_cycles(8))
 def test_everything_sensed_comes_back_bit_for_bit(cycle) -> None:  # type: ignore[no-untyped-def]
-    schema = Schema("/x", Sensed)
-    schema.put(CYCLE.sensed)
-    schema.put(cycle.sensed)
-    assert bits(schema.take(row(schema, 1))) == bits(cycle.sensed)
+    for name, schema in consumed_schemas().items():
+        schema.put(getattr(CYCLE.sensed, name))
+        schema.put(getattr(cycle.sensed, name))
+        assert bits(schema.take(row(schema, 1))) == bits(getattr(cycle.sensed, name))
 
 
 def test_awkward_numbers_keep_their_bits() -> None:
@@ -99,3 +102,13 @@ def test_every_value_of_a_verdict_has_a_column_of_its_own_name() -> None:
 def test_a_hint_without_columns_is_named() -> None:
     with pytest.raises(TypeError, match=r"no columns for.*complex"):
         Schema("/x", tuple[complex, ...])
+
+
+def test_the_schema_is_raised_with_its_columns() -> None:
+    """A log lays its columns out by name; one that a reader expects and an older log lacks would be misread.
+
+    A change of these columns asks for a new SCHEMA_VERSION, and for the checksum of its columns here.
+    """
+    schemas = {**consumed_schemas(), **decided_schemas()}
+    columns = sorted(f"{s.entity} {column.name} {column.kind.name}" for s in schemas.values() for column in s.columns.values())
+    assert (SCHEMA_VERSION, zlib.crc32("\n".join(columns).encode())) == (3, 3059202935)
