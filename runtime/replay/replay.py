@@ -107,12 +107,19 @@ class _Replay:
         times = starts_ns(self._log, CHECK)
         if not times:
             raise ConfigurationError(f"the log {self._log} holds no tick")
+        self._require_within(min(times), max(times))
         asked = self._options.first
         if asked is None:
             return min(times)
-        if asked > max(times):
-            raise ConfigurationError(f"--from {asked}: the log {self._log} ends with tick {max(times)}")
         return max((tick for tick in starts_ns(self._log, KEY_FRAME) if tick <= asked), default=min(times))
+
+    def _require_within(self, begins: int, ends: int) -> None:
+        first, last = self._options.first, self._options.last
+        for option, asked in (("--from", first), ("--to", last)):
+            if asked is not None and not begins <= asked <= ends:
+                raise ConfigurationError(f"{option} {asked}: the log {self._log} holds ticks {begins} to {ends}")
+        if first is not None and last is not None and last < first:
+            raise ConfigurationError(f"--to {last} is before --from {first}")
 
     def _run(self, stretch: Iterator[Row], side_by_side: SideBySide | None) -> int:
         """Replay one stretch; return the tick that it began with."""

@@ -51,7 +51,9 @@ def test_every_planner_comes_to_the_same(planner: str, tmp_path: Path) -> None:
         ("door", ("estimator.memory.kind=layers", "estimator.tracks=grid", "estimator.odometry.kind=ekf")),
         ("door", ("estimator.odometry.kind=dead_reckoning",)),
         ("dynamic_hallway", ("planner.latency_ticks=2", "planner.period_ticks=3")),
+        ("dynamic_hallway", ("estimator.registration.enabled=true", "estimator.tracks=truth")),
         ("arm_bench", ()),
+        ("arm_bench_markers", ()),
         ("arm_waypoints", ()),
         ("static_corridor", ("loop.work_ms=70", "loop.plan_ms=65")),
         ("dynamic_hallway", ("loop.realtime=true", "planner.latency_ticks=1")),
@@ -111,7 +113,9 @@ def test_a_tick_that_is_missing_ends_a_stretch_and_the_next_key_frame_begins_one
     [
         (ReplayOptions(overrides=("robot.radius_m=0.2",)), "a replay has the devices"),
         (ReplayOptions(planner="nobody"), "unknown planner 'nobody'"),
-        (ReplayOptions(first=100_000), "ends with tick"),
+        (ReplayOptions(first=100_000), "--from 100000: the log .* holds ticks 0 to 60"),
+        (ReplayOptions(last=61), "--to 61: the log .* holds ticks 0 to 60"),
+        (ReplayOptions(first=40, last=20), "--to 20 is before --from 40"),
     ],
 )
 def test_what_cannot_be_replayed_is_refused_in_a_sentence(hallway: Path, options: ReplayOptions, said: str) -> None:
