@@ -15,7 +15,7 @@ class Budget(Settings):
     """The bounds of one figure; those that are not given do not bind."""
 
     unit: str = "ms"
-    at_most: float | None = Field(None, gt=0.0, description="of the median")
+    at_most: float | None = Field(None, ge=0.0, description="of the median; 0: it must not happen at all")
     p99_at_most: float | None = Field(None, gt=0.0, description="of the 99th percentile")
     at_least: float | None = Field(None, gt=0.0, description="for figures where more is better")
     ratio_at_most: float | None = Field(None, gt=0.0, description="of the median over the peer's")
