@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import subprocess
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -12,6 +13,9 @@ from drivers.interface.errors import ConfigurationError
 from runtime.log.marks import END, SEGMENT
 from runtime.log.opening import require_log, require_recording
 from runtime.log.paths import files_of, stem_of
+from runtime.log.rescue import without_fatal
+
+_PANICKED = 102  # exit code of Rerun's program
 
 
 def rerun_program() -> str:
@@ -51,16 +55,31 @@ def repair(damaged: Path, repaired: Path | None = None) -> Path:
         require_recording(file)
     with TemporaryDirectory(dir=_folder(path), prefix=".repair-") as folder:
         saved = Path(folder) / path.name
-        # The marks of the files speak of others, and of bytes that are no longer the same.
-        options = ["--continue-on-error", "--drop-entity", END, "--drop-entity", SEGMENT, "-o", str(saved)]
-        command = [rerun_program(), "rrd", "filter", *map(str, files), *options]
-        subprocess.run(command, env=quiet_environment(), capture_output=True, check=False)  # failed: there is no output
+        if not _save(files, saved):
+            rescued = [_rescued(file, Path(folder) / str(index)) for index, file in enumerate(files)]
+            _save(rescued, saved)
         try:
             require_log(saved)
         except ConfigurationError as error:
             raise ConfigurationError(f"nothing of {damaged} can be saved") from error
         saved.rename(path)
     return path
+
+
+def _save(files: Sequence[Path], saved: Path) -> bool:
+    """Write what can be read of files to another one; return whether Rerun's program lived to its own end."""
+    # The marks of the files speak of others, and of bytes that are no longer the same.
+    options = ["--continue-on-error", "--drop-entity", END, "--drop-entity", SEGMENT, "-o", str(saved)]
+    command = [rerun_program(), "rrd", "filter", *map(str, files), *options]
+    return subprocess.run(command, env=quiet_environment(), capture_output=True, check=False).returncode != _PANICKED
+
+
+def _rescued(file: Path, folder: Path) -> Path:
+    """Return a copy of a file without what Rerun's program does not survive."""
+    folder.mkdir()
+    copy = folder / "rescued.rrd"
+    without_fatal(file, copy, lambda some: _save([some], folder / "tried.rrd"))
+    return copy
 
 
 def _folder(path: Path) -> Path:

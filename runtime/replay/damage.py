@@ -42,20 +42,24 @@ def damage_of(log: Path) -> Damage:
     try:
         return Damage(verified(log).findings, is_altered=Seal.BROKEN in seals)
     except DamagedLogError as error:
-        return Damage((f"{error}; {_first_damaged(log)}",), is_altered=True, is_readable=False)
+        return Damage((f"{error}; {_saved_extent(log)}",), is_altered=True, is_readable=False)
 
 
-def _first_damaged(log: Path) -> str:
-    """Say which tick is the first that cannot be read, by what can be saved of the log."""
+def _saved_extent(log: Path) -> str:
+    """Say how far the ticks are whole in what can be saved of the log."""
     with TemporaryDirectory() as folder:
         try:
             saved = repair(log, Path(folder) / "saved.rrd")
             found = verified(saved)
         except ConfigurationError:
-            return "which tick is the first damaged one cannot be told"
-        return f"the first tick that is damaged or missing is {_first_of(found, sorted(starts_ns(saved, CHECK)))}"
+            return "nothing of it can be saved"
+        return _extent(found, sorted(starts_ns(saved, CHECK)))
 
 
-def _first_of(found: Verification, ticks: list[int]) -> int:
+def _extent(found: Verification, ticks: list[int]) -> str:
+    """Say how far all ticks can be saved whole."""
     before_gaps = (max((tick for tick in ticks if tick < gap), default=-1) + 1 for gap in found.gaps)
-    return min((*found.damaged, *before_gaps), default=found.last_tick + 1)
+    first = min((*found.damaged, *before_gaps), default=None)
+    if first is None:
+        return f"its ticks are whole up to {found.last_tick}, and none after it can be read"
+    return f"tick {first} is the first that is damaged or missing"
