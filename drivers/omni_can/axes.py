@@ -9,6 +9,7 @@ import numpy as np
 from drivers.io.session import Port
 from drivers.omni_can.axis import CLOSED_LOOP, Axis
 from drivers.omni_can.bus_load import LoadMeter
+from drivers.omni_can.cadence import Cadence
 from drivers.omni_can.can_wire import BusChoice, Frame, Wire
 from drivers.omni_can.codec import COMMAND_BITS, COMMAND_MASK, Codec
 
@@ -37,6 +38,7 @@ class SessionSettings:
     watchdog_s: float
     verify_watchdog: bool
     heartbeat_s: float
+    encoder_s: float
     latency_s: float
     connect_s: float
     silent_s: float
@@ -98,7 +100,13 @@ class Axes:
         s = self._settings
         self._codec: Codec = s.codecs[firmware]
         self.each = [
-            Axis(f"axis {index + 1} (node {node})", node, self._codec, BELIEF * s.fastest_turns_s)
+            Axis(
+                f"axis {index + 1} (node {node})",
+                node,
+                self._codec,
+                BELIEF * s.fastest_turns_s,
+                Cadence(round(s.encoder_s * 1e9)),
+            )
             for index, node in enumerate(s.node_ids)
         ]
         self._by_node = {axis.node: index for index, axis in enumerate(self.each)}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from drivers.omni_can.cadence import Cadence
 from drivers.omni_can.codec import Codec, Message, bit_names
 
 CLOSED_LOOP = 8
@@ -31,6 +32,7 @@ class Axis:
     node: int
     codec: Codec
     fastest_turns_s: float  # what is faster is not believed
+    cadence: Cadence  # of its encoder's messages
     state: int | None = None  # as of the last heartbeat
     error: int = 0
     turning: Turning | None = None
@@ -80,7 +82,7 @@ class Axis:
         self.last_ns = captured_ns
         match message.name:
             case "Get_Encoder_Estimates":
-                return self._turn(captured_ns, float(values[0]), float(values[1]))
+                return self._turn(self.cadence.captured_ns(captured_ns), float(values[0]), float(values[1]))
             case "Heartbeat":
                 return self._beat(message, values)
             case "Get_Bus_Voltage_Current":

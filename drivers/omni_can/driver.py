@@ -146,6 +146,7 @@ def session_settings(settings: OmniCanSettings, name: str) -> SessionSettings:
         watchdog_s=settings.watchdog_s,
         verify_watchdog=settings.verify_watchdog,
         heartbeat_s=settings.heartbeat_ms * 1e-3,
+        encoder_s=settings.encoder_ms * 1e-3,
         latency_s=settings.latency_s,
         connect_s=settings.connect_s,
         silent_s=settings.silent_s,
