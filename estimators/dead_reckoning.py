@@ -19,7 +19,7 @@ from drivers.interface.sensed import Sensed
 from drivers.interface.settings import Settings
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import F64, EstimatorFault
-from estimators.odometry import SECOND_NS, OdometryEstimate, PoseTrail, is_plausible, latest_valid_ns
+from estimators.odometry import SECOND_NS, STAMP_SLACK_S, OdometryEstimate, PoseTrail, is_plausible, latest_valid_ns
 
 GYRO_SAMPLES_MAX = 1024  # kept while no wheel sample comes that could use them
 
@@ -136,7 +136,7 @@ class DeadReckoning:
         limits = settings.speed_max_m_s, settings.turn_rate_max_rad_s
         reported = SE2(twist.vx, twist.vy, twist.wz)
         turned = SE2(motion.x, motion.y, turn_rad)
-        if not (is_plausible(turned, elapsed_s, *limits) and is_plausible(reported, 1.0, *limits)):
+        if not (is_plausible(turned, elapsed_s + STAMP_SLACK_S, *limits) and is_plausible(reported, 1.0, *limits)):
             self._trail.append(captured_ns, self._trail.pose, BodyTwist())
             return False
         self._grow(motion, abs(turn_rad))

@@ -10,10 +10,10 @@ from drivers.interface.geometry import wrap_angle
 from drivers.interface.kinematics import WheelKinematics
 from drivers.interface.samples import ImuSample, PoseSample, WheelSample
 from estimators.ekf_algebra import Algebra, squared_surprise
-from estimators.ekf_model import BIASES, GYRO_BIAS, POSE, STATES, VELOCITY, WAY, YAW, transition, without_way
+from estimators.ekf_model import BIASES, GYRO_BIAS, POSE, STATES, VELOCITY, VX, WAY, YAW, transition, without_way
 from estimators.ekf_settings import EkfSettings
 from estimators.ekf_state import EkfState
-from estimators.odometry import SECOND_NS
+from estimators.odometry import SECOND_NS, STAMP_SLACK_S
 from estimators.odometry_limits import MotionLimits
 from estimators.wheel_way import WheelModel, WheelWay, farthest
 
@@ -106,7 +106,9 @@ class MotionFilter:
         if after.wheels_ns is not None:
             if self._stands(state, sample):
                 way = model.standstill()
+            lost = elapsed_s > self._settings.gap_max_s and after.covariance[VX, VX] > self._settings.speed_unknown_std_m_s**2
             after = self._gated(after, way, captured_ns)
+            after = self._at_speed(after, way) if lost else after
         return self._anchored(after, sample)
 
     def _fold_pose(self, state: EkfState, sample: PoseSample) -> EkfState:
@@ -138,7 +140,8 @@ class MotionFilter:
     def _plausible(self, way: WheelWay, elapsed_s: float) -> bool:
         speed_max, rate_max = self._limits.speed_max_m_s, self._limits.turn_rate_max_rad_s
         (dx, dy, turned), (vx, vy, wz) = way.vector.tolist(), way.twist.tolist()
-        moves = math.hypot(dx, dy) <= speed_max * elapsed_s and abs(turned) <= rate_max * elapsed_s
+        longest_s = elapsed_s + STAMP_SLACK_S
+        moves = math.hypot(dx, dy) <= speed_max * longest_s and abs(turned) <= rate_max * longest_s
         return moves and math.hypot(vx, vy) <= speed_max and abs(wz) <= rate_max
 
     def _held(self, state: EkfState, time_ns: int) -> EkfState:
@@ -229,6 +232,18 @@ class MotionFilter:
         if weight == 0.0:
             return state
         x, covariance = self._algebra.correct(state, innovation, WAY, way.covariance / weight)
+        return state._replace(x=x, covariance=covariance)
+
+    def _at_speed(self, state: EkfState, way: WheelWay) -> EkfState:
+        """Believe the wheels' rates for the velocity, where a gap has left it unknown.
+
+        A way that is divided by its time would do, were the time right: if stamps or the world stood still, it is not, and the
+        wheels would contradict the wrong velocity from then on.
+        """
+        x, covariance = state.x.copy(), state.covariance.copy()
+        x[VELOCITY] = way.twist[:2]
+        covariance[VELOCITY] = covariance[:, VELOCITY] = 0.0
+        covariance[VELOCITY, VELOCITY] = np.eye(2) * self._settings.speed_unknown_std_m_s**2
         return state._replace(x=x, covariance=covariance)
 
     def _begun_anew(self, state: EkfState, way: WheelWay) -> EkfState:

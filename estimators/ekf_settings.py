@@ -29,6 +29,12 @@ class EkfSettings(Settings):
     gap_max_s: float = Field(default=0.05, gt=0.0, le=1.0, description="a gyro that is silent for longer is not interpolated")
     blind_max_s: float = Field(default=0.5, gt=0.0, le=10.0, description="after so long without a sample the motion is unknown")
     encoder_noise_rad: float = Field(default=1e-3, gt=0.0, le=0.1, description="of a wheel's turn between two samples")
+    stamp_std_s: float = Field(
+        default=1e-3, ge=0.0, le=0.1, description="of the stamp of each wheel: most are those of an arrival at the host"
+    )
+    speed_unknown_std_m_s: float = Field(
+        default=0.1, gt=0.0, le=10.0, description="a velocity that is less certain, as after a gap, is that of the wheels"
+    )
     still_rad: float = Field(
         default=4e-3, ge=0.0, le=0.1, description="wheels that turn no further than their counting jitters stand"
     )

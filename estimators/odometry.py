@@ -16,6 +16,7 @@ from estimators.belief import F64, EstimatorFault
 
 SECOND_NS = 1_000_000_000
 FUTURE_TOLERANCE_NS = SECOND_NS // 10  # a stamp later than the tick by more than this is wrong
+STAMP_SLACK_S = 0.01  # by so much a stamp may be wrong: samples that are stamped on arrival bunch when the host is busy
 
 
 @dataclass(frozen=True, slots=True)

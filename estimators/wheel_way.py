@@ -39,6 +39,7 @@ class Trust(NamedTuple):
     position_variance_m2_per_rad: float
     yaw_variance_rad2_per_m: float
     yaw_variance_rad2_per_rad: float
+    stamp_std_s: float
 
 
 class WheelModel:
@@ -99,6 +100,8 @@ def _way(
     grip[0, 0] += way_error
     grip[1, 1] += way_error
     grip[2, 2] += yaw_error + LEAST
+    early = columns * (rates * trust.stamp_std_s)  # (3, wheels): each turned on for as long as its stamp is wrong
+    grip += early @ early.T
     covariance = grip.copy()
     slip = trust.position_variance_m2_per_m * way_m + trust.position_variance_m2_per_rad * angle
     covariance[0, 0] += slip
