@@ -12,9 +12,9 @@ from rich.console import Console
 
 from drivers.interface.errors import ConfigurationError, TrundleError
 from runtime.commands import calibrate, log
+from runtime.commands.compare import compare
 from runtime.commands.doctor import doctor
 from runtime.commands.emulate import emulate
-from runtime.commands.compare import compare
 from runtime.commands.evaluate import evaluate
 from runtime.commands.listing import list_
 from runtime.commands.replay import replay
