@@ -24,6 +24,7 @@ def test_the_words_tell_what_happened_and_when_it_was_over(log: Path) -> None:
     assert ticks(log) == list(range(12))
     assert texts(log).splitlines() == [
         "goal: 7 m, 0 m",
+        "planner: reason: clear",
         "response: RUN",
         "operator: jog 0.1 m/s, 0 m/s, -0 rad/s",
         "operator: new goal at 1 m, 2 m",
