@@ -22,6 +22,7 @@ class SeenState:
     device: str
     newest: Stamp | None
     expired_commands: int
+    overflowed: int
     arrivals_ns: tuple[int, ...]
     arrivals: tuple[int, ...]  # samples at each
 
@@ -40,6 +41,7 @@ class _Seen:
 
     newest: Stamp | None = None
     expired_commands: int = 0
+    overflowed: int = 0  # samples that came, and that the loop never saw
     arrivals: deque[tuple[int, int]] = field(default_factory=deque)  # (tick time, samples) within the rate window
     arrived: int = 0  # samples in it
 
@@ -96,7 +98,9 @@ class DeviceWatch:
         for stamp in stamps:  # the same sample again is not news
             if seen.newest is None or stamp.captured_ns > seen.newest.captured_ns:
                 seen.newest, fresh = stamp, fresh + 1
+        skipped, seen.overflowed = health.overflowed - seen.overflowed, health.overflowed
         if fresh:
+            fresh += max(skipped, 0)  # fewer than before: it was opened again
             seen.arrivals.append((now_ns, fresh))
             seen.arrived += fresh
         if seen.newest is None:
@@ -136,12 +140,12 @@ class DeviceWatch:
 
 def _at_rest(device: str, seen: _Seen) -> SeenState:
     times, counts = zip(*seen.arrivals, strict=True) if seen.arrivals else ((), ())
-    return SeenState(device, seen.newest, seen.expired_commands, times, counts)
+    return SeenState(device, seen.newest, seen.expired_commands, seen.overflowed, times, counts)
 
 
 def _awake(rest: SeenState) -> _Seen:
     arrivals = deque(zip(rest.arrivals_ns, rest.arrivals, strict=True))
-    return _Seen(rest.newest, rest.expired_commands, arrivals, sum(rest.arrivals))
+    return _Seen(rest.newest, rest.expired_commands, rest.overflowed, arrivals, sum(rest.arrivals))
 
 
 def _stamps(sensed: Sensed) -> dict[str, tuple[Stamp, ...]]:

@@ -146,6 +146,15 @@ def test_half_the_rate_slows_the_robot() -> None:
     assert verdicts[-1].command.base.vx <= 0.375 + 1e-6
 
 
+def test_samples_that_the_loop_was_too_slow_to_see_count_for_the_rate() -> None:
+    guard = supervisor(startup_grace_s=0.0)
+    one_of_five = [
+        sensed(k, base=(wheels(k * PERIOD_NS - MS, 5 * k),), health=(health(received=5 * (k + 1), overflowed=4 * (k + 1)),))
+        for k in range(120)
+    ]
+    assert not any(guard.admit(FORWARD, belief(k), cycle).faults for k, cycle in enumerate(one_of_five))
+
+
 def test_half_the_rate_slows_the_arm_as_well() -> None:
     setup = SupervisorSetup(PERIOD_NS * 1e-9, None, PERIOD_NS, has_operator=True, arm_limits=PANDA)
     guard = Supervisor(SupervisorSection(startup_grace_s=0.0, slow_factor=0.4), setup, Passing(), FaultBoard())
