@@ -197,7 +197,7 @@ class RealSenseSession:
         steering = (["depth"] if self._depth is not None else []) + (["gyroscope"] if self._motion is not None else [])
         unheard = [kind for kind in steering if kind not in self._heard_ns]
         if not unheard:
-            self._health.state = DeviceState.OPEN
+            self._health.state, self._health.fault = DeviceState.OPEN, ""
         elif now_ns - began_ns > s.connect_s * 1e9:
             raise DeviceError(f"{self._port.name}: no {unheard[0]} came from {s.place} within {s.connect_s:g} s")
         if s.source == "bag":
