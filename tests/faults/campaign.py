@@ -22,6 +22,7 @@ from rich.console import Console
 from rich.table import Table
 
 from drivers.emulated_truth import EmulatedTruth
+from drivers.interface.commands import Command
 from drivers.interface.settings import Settings
 from runtime import configuration
 from runtime.cycle import Cycle
@@ -29,7 +30,7 @@ from runtime.faults import Response
 from runtime.log.paths import files_of
 from runtime.log.read import ticks
 from runtime.run import RunOptions, RunResult, run
-from tests.faults.emulated import emulated
+from tests.faults.emulated import EmulatedRobot, emulated
 
 HERE = Path(__file__).parent
 HANGS_S = 300.0  # a case that takes longer ends the campaign with a traceback
@@ -43,7 +44,8 @@ class Script(Settings):
     """One file."""
 
     configuration: str
-    robot: str | None = None  # the emulated one, beside the script
+    robot: str | None = None  # the emulated one, beside the script or shipped
+    wires: tuple[str, ...] = EmulatedRobot.wires
     changes: tuple[str, ...] = ()
     at_s: float
     for_s: float
@@ -77,9 +79,15 @@ class Watch:
             self.resumed = True
         if self.answered_s is None and verdict.response >= Response.STAND_DOWN:
             self.answered_s = since_s
-        twist = verdict.command.base
-        if self.zero_s is None and self.answered_s is not None and twist is not None:
-            self.zero_s = since_s if max(abs(twist.vx), abs(twist.vy), abs(twist.wz)) < AT_REST else None
+        if self.zero_s is None and self.answered_s is not None and _stands(verdict.command):
+            self.zero_s = since_s
+
+
+def _stands(command: Command) -> bool:
+    """Whether base and arm are both told to rest."""
+    twist, arm = command.base, command.arm
+    base_rests = twist is None or max(abs(twist.vx), abs(twist.vy), abs(twist.wz)) < AT_REST
+    return base_rests and (arm is None or arm.is_rest)
 
 
 @dataclass(frozen=True)
@@ -129,7 +137,9 @@ def over_a_wire(script: Script, case: dict[str, Any], log: Path) -> tuple[Watch,
     at_s, for_s = case.pop("at_s", script.at_s), case.pop("for_s", script.for_s)
     device, watch = case.pop("device"), Watch(at_s, at_s + for_s)
     fault = yaml.safe_dump([{"from_s": at_s, "until_s": at_s + for_s} | case], default_flow_style=True, width=1000).strip()
-    with emulated(f"robot.emulation.{device}.faults={fault}", robot=str(HERE / str(script.robot))) as robot:
+    name = str(HERE / script.robot) if str(script.robot).endswith(".yaml") else str(script.robot)
+    kept = {"robot": name, "wires": script.wires, "scenario": script.configuration}
+    with emulated(f"robot.emulation.{device}.faults={fault}", **kept) as robot:
         loaded = configuration.load(script.configuration, (*robot.overrides, *script.changes))
         with _begin_noted(lambda now_ns: setattr(watch, "began_ns", now_ns)):
             return watch, run(loaded, RunOptions(log=log, progress=watch.take))

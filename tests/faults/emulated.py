@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import can
 
@@ -45,6 +46,8 @@ class EmulatedRobot:
     """`trundle emulate` of the XLeRobot, or of another robot with its base, on ports of its own."""
 
     robot: str = "xlerobot_emulated"
+    wires: tuple[str, ...] = ("robot.base.bus.port={port}", "robot.base.connect_s=20")  # the robot's own, with a free port
+    scenario: str = "square"
     can_port: int = field(default_factory=free_port)
     truth_port: int = field(default_factory=free_port)
     lines: list[str] = field(default_factory=list)
@@ -53,8 +56,8 @@ class EmulatedRobot:
     def overrides(self) -> tuple[str, ...]:
         """What emulation and run must both be told."""
         return (
-            f"robot={self.robot}", f"robot.base.bus.port={self.can_port}", f"robot.truth.port={self.truth_port}",
-            "robot.base.connect_s=20", "robot.truth.open_timeout_s=30",
+            f"robot={self.robot}", f"robot.truth.port={self.truth_port}", "robot.truth.open_timeout_s=30",
+            *(wire.format(port=self.can_port) for wire in self.wires),
         )  # fmt: skip
 
     @property
@@ -93,11 +96,11 @@ def trundle(*arguments: str, **options: object) -> "subprocess.Popen[str]":
 
 
 @contextmanager
-def emulated(*changes: str, robot: str = "xlerobot_emulated") -> Iterator[EmulatedRobot]:
+def emulated(*changes: str, **of_robot: Any) -> Iterator[EmulatedRobot]:
     """Emulate within the block; the world's process is put before others where that is permitted."""
-    emulation = EmulatedRobot(robot)
+    emulation = EmulatedRobot(**of_robot)
     more = [word for change in (*changes, "loop.system.priority=20") for word in ("--set", change)]
-    process = trundle("emulate", "square", *emulation.changes, *more)
+    process = trundle("emulate", emulation.scenario, *emulation.changes, *more)
     reader = threading.Thread(target=lambda: emulation.lines.extend(iter(process.stdout.readline, "")))
     reader.start()
     try:

@@ -106,8 +106,9 @@ def test_unplugged_it_is_lost_and_plugged_in_again_it_goes_on():
         both.session.open()
         both.wait(0.1)
         assert both.port.health.state is DeviceState.RECONNECTING
+        both.port.health.fault = "why it was lost"  # as the process notes it
         after = both.frames(1.0)
-        assert both.port.health.state is DeviceState.OPEN
+        assert (both.port.health.state, both.port.health.fault) == (DeviceState.OPEN, "")
         assert len(after) > 10
         assert after[0][0]["sequence"] > before[-1][0]["sequence"]
         assert after[0][0]["captured_ns"] > before[-1][0]["captured_ns"]
