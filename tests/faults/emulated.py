@@ -46,7 +46,10 @@ class EmulatedRobot:
     """`trundle emulate` of the XLeRobot, or of another robot with its base, on ports of its own."""
 
     robot: str = "xlerobot_emulated"
-    wires: tuple[str, ...] = ("robot.base.bus.port={port}", "robot.base.connect_s=20")  # the robot's own, with a free port
+    wires: tuple[str, ...] = (  # the robot's own, with a free port
+        "robot.base.bus.port={port}", "robot.base.connect_s=20",
+        "robot.camera.memory=faults-{port}", "robot.imu.memory=faults-{port}",
+    )  # fmt: skip
     scenario: str = "square"
     can_port: int = field(default_factory=free_port)
     truth_port: int = field(default_factory=free_port)

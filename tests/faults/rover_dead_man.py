@@ -34,11 +34,22 @@ class Rover:
         rig = Rig({}, {"boot_s": 0.0, "estimate_s": 0.0})
         self.running = FreeRunning("rover_serial", RoverBase.Settings(url=self.url), rig, self.world, 1)
         self.world.compile()
+        self._timeouts = 0
 
     @property
     def speed_m_s(self) -> float:
         vx, vy = self.world.data.qvel[:2]
         return math.hypot(vx, vy)
+
+    @property
+    def timeouts(self) -> int:
+        """How often the autopilot itself had to stop because nothing was asked of it any more."""
+        return self.running._firmware.state.timeouts
+
+    @property
+    def timed_out(self) -> bool:
+        """Whether it had to since the last blow."""
+        return self.timeouts > self._timeouts
 
     @property
     def is_told_to_drive(self) -> bool:
@@ -52,7 +63,7 @@ class Rover:
             try:
                 until(lambda: self.speed_m_s > DRIVING_M_S, "it never drove")
                 (io,) = children(process.pid)
-                struck_s = time.monotonic()
+                struck_s, self._timeouts = time.monotonic(), self.timeouts
                 os.kill(io if blow == "kill_io" else process.pid, signal.SIGSTOP if blow == "stop" else signal.SIGKILL)
                 if blow == "kill_io":  # whoever starts another process at the wire would come back
                     os.kill(process.pid, signal.SIGSTOP)

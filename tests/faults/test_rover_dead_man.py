@@ -18,4 +18,4 @@ def test_the_rover_is_told_zero_or_times_out_and_comes_to_rest(scene, blow):
     for vx_m_s in (0.4, -0.4):
         tried = scene.attempt(blow, vx_m_s)
         assert 0.0 < tried.safe_s < tried.still_s
-    assert (scene.running._firmware.state.timeouts > 0) == (blow == "kill_io")  # else zero came from the process at the wire
+        assert scene.timed_out == (blow == "kill_io")  # else zero came from the process at the wire
