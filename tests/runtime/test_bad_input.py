@@ -12,7 +12,10 @@ from runtime.cli import run_command
     [
         (["run", "dynamic_halway"], "unknown configuration 'dynamic_halway'; did you mean 'dynamic_hallway'? Known: "),
         (["run", "nowhere/at_all.yaml"], "there is no file 'nowhere/at_all.yaml'"),
-        (["run", "door", "--set", "planner.name=dwaa"], "planner.name: unknown planner 'dwaa'; did you mean 'dwa'? Known: clearance_manifold"),
+        (
+            ["run", "door", "--set", "planner.name=dwaa"],
+            "planner.name: unknown planner 'dwaa'; did you mean 'dwa'? Known: clearance_manifold",
+        ),
         (["run", "door", "--set", "world.scenario=dor"], "world.scenario: unknown scenario 'dor'; did you mean 'door'?"),
         (["run", "door", "--set", "robot.base.driver=sim_omi"], "robot.base.driver: unknown driver 'sim_omi'"),
         (["run", "door", "--set", "robot=xlerobo"], "unknown robot 'xlerobo'; did you mean 'xlerobot'?"),
