@@ -52,7 +52,7 @@ def spoiled(seed):
 )
 def test_equals_the_slow_reference(seed, pitch, roll, x, yaw):
     random = stream(seed, "scene")
-    # Depth is in whole millimetres: a camera on a whole one too would put returns exactly between two cells, where rounding decides.
+    # Depth is in whole millimetres: a camera on a whole one would put returns exactly between two cells, where rounding decides.
     pose, camera = SE2(x, 0.3, yaw), level_camera(0.4, pitch, roll, x_m=0.1003)
     pillars = [Pillar(x + r * math.cos(a), 0.3 + r * math.sin(a), 0.12, 0.5) for r, a in random.uniform(0.5, 1.5, (3, 2))]
     scene = [Floor(), *pillars, Wall(yaw + 0.3, x * math.cos(yaw + 0.3) + 0.3 * math.sin(yaw + 0.3) + 1.0)]
