@@ -108,7 +108,7 @@ class MotionFilter:
                 way = model.standstill()
             lost = elapsed_s > self._settings.gap_max_s and after.covariance[VX, VX] > self._settings.speed_unknown_std_m_s**2
             after = self._gated(after, way, captured_ns)
-            after = self._at_speed(after, way) if lost else after
+            after = self._at_speed(after, way) if lost or self._is_too_fast(after) else after
         return self._anchored(after, sample)
 
     def _fold_pose(self, state: EkfState, sample: PoseSample) -> EkfState:
@@ -233,6 +233,10 @@ class MotionFilter:
             return state
         x, covariance = self._algebra.correct(state, innovation, WAY, way.covariance / weight)
         return state._replace(x=x, covariance=covariance)
+
+    def _is_too_fast(self, state: EkfState) -> bool:
+        """Whether a correction by a way whose time was wrong has left a velocity that no base has."""
+        return math.hypot(*state.x[VELOCITY].tolist()) > self._limits.speed_max_m_s
 
     def _at_speed(self, state: EkfState, way: WheelWay) -> EkfState:
         """Believe the wheels' rates for the velocity, where a gap has left it unknown.
