@@ -66,7 +66,7 @@ class Bench:
         self.firmware.close()
 
     def _step(self) -> None:
-        while not self._leave.wait(0.002):
+        while not self._leave.wait(0.01):
             self.world.step_to(self.world.now_ns + 10_000_000)
 
 
