@@ -8,7 +8,8 @@ from typing import ClassVar, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.interface.mission import Mission
+from drivers.interface.geometry import wrap_angle
+from drivers.interface.mission import Goal, Mission
 from drivers.interface.settings import Settings
 from drivers.interface.stateful import Stateful
 from estimators.belief import Belief
@@ -33,11 +34,17 @@ class Route:
     path_in_odom: NDArray[np.float64]  # (n, 2), from the robot towards the goal
     length_m: float
     blocked: bool = False
+    goal_yaw_in_odom: float | None = None  # heading to arrive with [rad]; None: any
 
     @property
     def empty(self) -> bool:
         """Whether there is nothing to follow."""
         return len(self.path_in_odom) == 0
+
+
+def goal_yaw(belief: Belief, goal: Goal) -> float | None:
+    """Return the heading [rad] in odom to arrive with; None: any will do."""
+    return None if goal.yaw_rad is None else wrap_angle(goal.yaw_rad - belief.map_from_odom.yaw)
 
 
 @runtime_checkable

@@ -13,7 +13,7 @@ from drivers.interface.stateful import pack, unpack
 from estimators.belief import Belief, Lattice
 from planners.planner import no_path
 from planners.polyline import arc_length, resample
-from planners.router import Route, RouterSetup
+from planners.router import Route, RouterSetup, goal_yaw
 from planners.routers.grid_costs import CostGrid, GridCosts, cost_grid
 from planners.routers.grid_graph import GridGraph, trace
 from planners.routers.grid_kernels import pull_straight
@@ -57,7 +57,7 @@ class GridRouter:
         self._last = path
         blocked = len(path) == 0
         length_m = 0.0 if blocked else float(arc_length(path)[-1]) + remainder_m
-        return Route((float(goal[0]), float(goal[1])), path, length_m, blocked)
+        return Route((float(goal[0]), float(goal[1])), path, length_m, blocked, goal_yaw(belief, mission.goal))
 
     def snapshot(self) -> bytes:
         """Return the last route."""

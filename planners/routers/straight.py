@@ -11,7 +11,7 @@ from drivers.interface.settings import Settings
 from estimators.belief import Belief
 from planners.planner import no_path
 from planners.polyline import resample
-from planners.router import Route, RouterSetup
+from planners.router import Route, RouterSetup, goal_yaw
 
 _SPACING_M = 0.25
 
@@ -35,7 +35,8 @@ class StraightRouter:
         robot = belief.odom_from_base
         goal = belief.map_from_odom.inverse().apply(np.array([mission.goal.x_m, mission.goal.y_m]))
         ends = np.array([[robot.x, robot.y], goal])
-        return Route((float(goal[0]), float(goal[1])), resample(ends, _SPACING_M), math.hypot(*(goal - ends[0])))
+        length_m, yaw = math.hypot(*(goal - ends[0])), goal_yaw(belief, mission.goal)
+        return Route((float(goal[0]), float(goal[1])), resample(ends, _SPACING_M), length_m, goal_yaw_in_odom=yaw)
 
     def snapshot(self) -> bytes:
         """Return nothing: it has no state."""

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from drivers.interface.geometry import SE2
-from drivers.interface.mission import Mission
+from drivers.interface.mission import Goal, Mission
 from estimators.belief import UNKNOWN
 from planners.polyline import arc_length
 from planners.router import RouterSetup
@@ -239,3 +239,11 @@ def test_route_does_not_shake_while_the_window_rolls(cell_m):
         middles.append(np.interp(2.0, *route.path_in_odom.T))
         assert arc_length(route.path_in_odom)[-1] < route.length_m
     assert np.ptp(middles) < 0.12
+
+
+@pytest.mark.parametrize("router", [router_of(), StraightRouter(StraightRouter.Settings(), RouterSetup(0.05, 0.12))])
+@pytest.mark.parametrize(("yaw_in_map", "yaw_in_odom"), [(None, None), (2.0, 1.5), (-3.0, 2.0 * math.pi - 3.5)])
+def test_the_heading_to_arrive_with_is_turned_into_odom(router, yaw_in_map, yaw_in_odom):
+    belief = belief_of([], map_from_odom=SE2(1.0, -2.0, 0.5))
+    mission = Mission(SE2(), (Goal(2.0, 0.0, yaw_in_map),))
+    assert router.route(belief, mission).goal_yaw_in_odom == (yaw_in_odom if yaw_in_odom is None else pytest.approx(yaw_in_odom))
