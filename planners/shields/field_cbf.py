@@ -5,6 +5,7 @@ Source: Cui, Deng, Wang, section 4.3, equations 5 to 8, appendix B.  README.md b
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -12,12 +13,16 @@ import numpy as np
 from pydantic import Field
 
 from drivers.interface.commands import BaseLimits, BodyTwist, Command
+from drivers.interface.geometry import SE2
 from drivers.interface.samples import frozen_array
 from drivers.interface.settings import Settings
-from estimators.belief import Belief
-from planners.planner import Diagnostics
+from estimators.belief import UNKNOWN, Belief, ClearanceField, Lattice, OccupancyGrid
+from planners.planner import Diagnostics, Drawing
 from planners.shield import Filtered, ReachableSet, ShieldSetup
-from planners.shields.field_cbf_kernels import Barrier, filter_velocity
+from planners.shields.field_cbf_forms import FORMS, Asked, Form
+from planners.shields.field_cbf_kernels import ALWAYS, FIELD_RATE, MATERIAL, Barrier
+
+GATES = {"material_derivative": MATERIAL, "field_rate": FIELD_RATE, "none": ALWAYS}
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +54,14 @@ class FieldCbf:
         contact_time_s: float = Field(0.40, ge=0.0, le=10.0, description="farther ones when contact is this near (T_cbf)")
         buffer_gain: float = Field(1.0, ge=0.0, le=10.0, description="beta of equation 8")
         buffer_min_m: float = Field(0.05, ge=0.0, le=1.0, description="least buffer")
-        buffer_max_m: float = Field(0.25, ge=0.0, le=2.0, description="largest buffer")
+        buffer_max_m: float | None = Field(0.25, ge=0.0, le=2.0, description="largest buffer; none: without bound (table 2)")
+        form: Literal["boundaries", "single_scalar", "objects"] = Field(
+            "boundaries",
+            description="what the barriers are made of: boundary samples, the field at the robot, or tracks (table 2)",
+        )
+        gate: Literal["material_derivative", "field_rate", "none"] = Field(
+            "material_derivative", description="closing rate that the time to contact counts; none: no gate (table 2)"
+        )
         reaction_time_s: float = Field(
             0.2,
             ge=0.0,
@@ -81,14 +93,20 @@ class FieldCbf:
             reaction_s=max(s.reaction_time_s, setup.period_s),
             buffer_gain=s.buffer_gain,
             buffer_min_m=s.buffer_min_m,
-            buffer_max_m=s.buffer_max_m,
+            buffer_max_m=math.inf if s.buffer_max_m is None else s.buffer_max_m,
+            gate=GATES[s.gate],
         )
+        self._filtered: Form = FORMS[s.form]
 
     def warm_up(self) -> None:
         """Compile the kernels, on an empty field; its arrays are read-only as a belief's are, which is a type of its own."""
-        field, none = frozen_array(np.zeros((3, 3), np.float32)), frozen_array(np.zeros((3, 3), np.bool_))
-        zero = np.zeros(2)
-        filter_velocity(field, field, none, zero, 1.0, np.zeros(3), zero, zero, zero, self._barrier)
+        lattice = Lattice(-1.5, -1.5, 1.0, 3, 3)
+        zero, none = frozen_array(np.zeros((3, 3), np.float32)), frozen_array(np.zeros((3, 3), np.bool_))
+        grid = OccupancyGrid(lattice, frozen_array(np.full((3, 3), UNKNOWN, np.uint8)))
+        field = ClearanceField(lattice, zero, zero, none, none)
+        belief = Belief(0, 0, SE2(), SE2(), BodyTwist(), np.zeros((3, 3)), grid, field, (), None, 0)
+        at_rest = np.zeros(2)
+        self._filtered(belief, Asked(at_rest, at_rest, at_rest), self._barrier)
 
     def filter(self, command: Command, belief: Belief, reachable: ReachableSet) -> Filtered:
         """Return the command with its twist filtered; wz is only clipped, as turning moves no boundary of a round robot.
@@ -98,9 +116,22 @@ class FieldCbf:
         if command.base is None:
             return Filtered(command)
         asked = command.base if command.base.finite else BodyTwist()
-        vx, vy, diagnostics = self._velocity(asked, belief, reachable)
-        twist = reachable.clip(BodyTwist(vx, vy, asked.wz))
-        return Filtered(replace(command, base=twist), intervened=twist != command.base, diagnostics=diagnostics)
+        low, high = reachable.lowest, reachable.highest
+        box = Asked(np.array([asked.vx, asked.vy]), np.array([low.vx, low.vy]), np.array([high.vx, high.vy]))
+        found = self._filtered(belief, box, self._barrier)
+        infeasible = found.enclosed or found.slack_m_s > 0.0
+        stops = infeasible and self._stop_when_infeasible
+        twist = reachable.clip(BodyTwist(0.0 if stops else found.vx, 0.0 if stops else found.vy, asked.wz))
+        said = FieldCbfDiagnostics(
+            len(found.boundaries),
+            len(found.constraining),
+            found.nearest_m - self._barrier.safe_m,
+            infeasible,
+            found.slack_m_s,
+            found.enclosed,
+        )
+        drawn = Drawing("boundaries", found.boundaries, False), Drawing("constraints", found.constraining, False)
+        return Filtered(replace(command, base=twist), twist != command.base, said, drawn)
 
     def snapshot(self) -> bytes:
         """Return nothing: it has no state."""
@@ -108,21 +139,6 @@ class FieldCbf:
 
     def restore(self, snapshot: bytes) -> None:
         """Nothing to take over."""
-
-    def _velocity(self, asked: BodyTwist, belief: Belief, reachable: ReachableSet) -> tuple[float, float, Diagnostics]:
-        """Return the filtered vx, vy in the body frame."""
-        field, pose, low, high = belief.clearance, belief.odom_from_base, reachable.lowest, reachable.highest
-        lattice = field.lattice
-        vx, vy, samples, active, nearest_m, slack, enclosed = filter_velocity(
-            field.clearance_m, field.rate_m_s, field.overlap, np.array([lattice.x_m, lattice.y_m]), lattice.cell_m,
-            np.array([pose.x, pose.y, pose.yaw]), np.array([asked.vx, asked.vy]),
-            np.array([low.vx, low.vy]), np.array([high.vx, high.vy]), self._barrier,
-        )  # fmt: skip
-        infeasible = enclosed or slack > 0.0
-        if infeasible and self._stop_when_infeasible:
-            vx, vy = 0.0, 0.0
-        least_h_m = nearest_m - self._barrier.safe_m
-        return vx, vy, FieldCbfDiagnostics(samples, active, least_h_m, infeasible, slack, enclosed)
 
 
 def _braking(limits: BaseLimits | None) -> tuple[float, float]:

@@ -12,7 +12,10 @@ from planners.shields.plane_qp import solve
 
 F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
+I64 = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+
+ALWAYS, FIELD_RATE, MATERIAL = 0, 1, 2  # what opens the gate of a boundary beyond the guard zone
 
 MIN_SLOPE = 0.5  # a distance field rises by 1 per metre; where much less is left, two boundaries cancel (medial axis)
 
@@ -30,6 +33,7 @@ class Barrier(NamedTuple):
     buffer_gain: float
     buffer_min_m: float
     buffer_max_m: float
+    gate: int
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -135,8 +139,37 @@ def boundary_samples(
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def constraints(normal: F64, distance: F64, rate: F64, asked: F64, barrier: Barrier) -> tuple[F64, F64]:
-    """Return the half-planes normal . u >= bound that are committed to the QP, shapes (m, 2) and (m,) [m/s].
+def own_gradient(field: F32, rate: F32, overlap: Mask, corner: F64, cell_m: float, robot: F64) -> tuple[F64, F64, F64, bool]:
+    """Return what a single-scalar barrier h = Gamma(x) - Gamma_safe reads at the robot, in the form of `boundary_samples`.
+
+    Source: Cui, Deng, Wang, section 4.3.  The normal is the field's slope as it is: between two walls it cancels.
+
+    Args:
+        field: clearance [m], shape (rows, columns).
+        rate: its rate [m/s], shape (rows, columns).
+        overlap: where the rate is known, shape (rows, columns).
+        corner: lower corner of the lattice in odom, shape (2,).
+        cell_m: size of a cell.
+        robot: in odom, shape (2,).
+    """
+    rows, columns = field.shape
+    normal, distance, recede = np.zeros((1, 2)), np.full(1, np.inf), np.zeros(1)
+    row, column = int(np.floor((robot[1] - corner[1]) / cell_m)), int(np.floor((robot[0] - corner[0]) / cell_m))
+    if not (0 < row < rows - 1 and 0 < column < columns - 1):
+        return normal, distance, recede, False
+    slope_x = (field[row, column + 1] - field[row, column - 1]) / (2.0 * cell_m)
+    slope_y = (field[row + 1, column] - field[row - 1, column]) / (2.0 * cell_m)
+    off_x = robot[0] - corner[0] - (column + 0.5) * cell_m
+    off_y = robot[1] - corner[1] - (row + 0.5) * cell_m
+    normal[0, 0], normal[0, 1] = slope_x, slope_y
+    distance[0] = field[row, column] + slope_x * off_x + slope_y * off_y
+    recede[0] = rate[row, column] if overlap[row, column] else 0.0
+    return normal, distance, recede, field[row, column] <= 0.0
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def constraints(normal: F64, distance: F64, rate: F64, asked: F64, barrier: Barrier) -> tuple[F64, F64, I64]:
+    """Return the half-planes normal . u >= bound that are committed to the QP, (m, 2) and (m,) [m/s], and of which samples, (m,).
 
     Source: Cui, Deng, Wang, equations 6 (constraint), 7 (gate) and 8 (buffer).
 
@@ -154,29 +187,30 @@ def constraints(normal: F64, distance: F64, rate: F64, asked: F64, barrier: Barr
         if not np.isfinite(distance[i]):
             continue
         h = distance[i] - barrier.safe_m
-        closing = -(rate[i] + normal[i, 0] * asked[0] + normal[i, 1] * asked[1])
-        if distance[i] > barrier.guard_m and h >= barrier.contact_time_s * max(0.0, closing):
+        closing = -rate[i]
+        if barrier.gate == MATERIAL:
+            closing -= normal[i, 0] * asked[0] + normal[i, 1] * asked[1]
+        near = distance[i] <= barrier.guard_m or h < barrier.contact_time_s * max(0.0, closing)
+        if barrier.gate != ALWAYS and not near:
             continue
         wanted = barrier.buffer_gain * max(0.0, -rate[i]) * barrier.reaction_s
         buffer = min(max(wanted, barrier.buffer_min_m), barrier.buffer_max_m)
         kept[count], bound[count] = i, -rate[i] - barrier.alpha_per_s * (h - buffer)
         count += 1
-    return normal[kept[:count]], bound[:count]
+    return normal[kept[:count]], bound[:count], kept[:count]
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def filter_velocity(
-    field: F32, rate: F32, overlap: Mask, corner: F64, cell_m: float, pose: F64, asked: F64, low: F64, high: F64,
-    barrier: Barrier,
-) -> tuple[float, float, int, int, float, float, bool]:  # fmt: skip
-    """Sample, constrain and solve.
+    normal: F64, distance: F64, rate: F64, enclosed: bool, pose: F64, asked: F64, low: F64, high: F64, barrier: Barrier
+) -> tuple[float, float, F64, F64, float, float, bool]:
+    """Constrain and solve, in the body frame.
 
     Args:
-        field: clearance [m], shape (rows, columns).
-        rate: its rate [m/s], shape (rows, columns).
-        overlap: where the rate is known, shape (rows, columns).
-        corner: lower corner of the lattice in odom, shape (2,).
-        cell_m: size of a cell.
+        normal: from boundary to robot in odom, shape (n, 2).
+        distance: to the boundary [m], shape (n,); infinite where there is none.
+        rate: at which the boundary recedes [m/s], shape (n,).
+        enclosed: whether the robot's own cell is occupied; then the velocity is zero.
         pose: x, y, yaw in odom, shape (3,).
         asked: vx, vy in the body frame, shape (2,).
         low: least vx, vy that can be reached, shape (2,).
@@ -184,20 +218,24 @@ def filter_velocity(
         barrier: how much room is kept, and when.
 
     Returns:
-        vx, vy, number of samples, number of constraints, least distance [m] (infinite without samples), slack of the QP
-        [m/s], and whether the robot's own cell is occupied; then the velocity is zero.
+        vx, vy; the boundary points in odom, shape (k, 2), and those of them that constrain, shape (m, 2); the least distance [m],
+        infinite without samples; the slack of the QP [m/s]; and `enclosed`.
     """
-    reach_m = 2.0 * barrier.safe_m
-    normal, distance, recede, enclosed = boundary_samples(
-        field, rate, overlap, corner, cell_m, pose[:2], barrier.sample_radius_m, reach_m, barrier.directions
-    )
-    samples = 0
     c, s = np.cos(pose[2]), np.sin(pose[2])
+    in_body, points = np.empty_like(normal), np.empty_like(normal)
+    count, nearest = 0, np.inf
     for i in range(len(distance)):
-        samples += np.isfinite(distance[i])
-        normal[i, 0], normal[i, 1] = c * normal[i, 0] + s * normal[i, 1], c * normal[i, 1] - s * normal[i, 0]
+        in_body[i, 0] = c * normal[i, 0] + s * normal[i, 1]
+        in_body[i, 1] = c * normal[i, 1] - s * normal[i, 0]
+        if np.isfinite(distance[i]):
+            points[count] = pose[:2] - distance[i] * normal[i]
+            nearest = min(nearest, distance[i])
+            count += 1
     if enclosed:
-        return 0.0, 0.0, samples, 0, 0.0, 0.0, True
-    normals, bounds = constraints(normal, distance, recede, asked, barrier)
+        return 0.0, 0.0, points[:count], points[:0], nearest, 0.0, True
+    normals, bounds, kept = constraints(in_body, distance, rate, asked, barrier)
     u, slack = solve(normals, bounds, asked, low, high)
-    return u[0], u[1], samples, len(bounds), distance.min(), slack, False
+    constraining = np.empty((len(kept), 2))
+    for i in range(len(kept)):
+        constraining[i] = pose[:2] - distance[kept[i]] * normal[kept[i]]
+    return u[0], u[1], points[:count], constraining, nearest, slack, False

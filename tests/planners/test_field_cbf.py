@@ -1,13 +1,15 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from drivers.interface.commands import BodyTwist
 from drivers.interface.geometry import SE2
+from estimators.belief import Track
 from planners.shield import ReachableSet, ShieldSetup
 from planners.shields.field_cbf import FieldCbf
-from planners.shields.field_cbf_kernels import Barrier, boundary_samples, constraints
+from planners.shields.field_cbf_kernels import MATERIAL, Barrier, boundary_samples, constraints
 from planners.shields.none import NoShield
 from tests.planners.synthetic import DIFFERENTIAL, OMNI, Box, Disc, belief_of, command_of, reachable_from
 
@@ -130,10 +132,10 @@ def test_far_side_of_a_pillar_gives_no_sample():
 
 def test_buffer_follows_equation_8_between_its_bounds():
     normal, asked = np.array([[-1.0, 0.0]]), np.zeros(2)
-    barrier = Barrier(0.22, 16, 0.7, 2.0, 0.3, 0.4, 0.2, 1.0, 0.05, 0.25)
+    barrier = Barrier(0.22, 16, 0.7, 2.0, 0.3, 0.4, 0.2, 1.0, 0.05, 0.25, MATERIAL)
 
     def buffer(rate):
-        _, bound = constraints(normal, np.array([0.25]), np.array([rate]), asked, barrier)
+        _, bound, _ = constraints(normal, np.array([0.25]), np.array([rate]), asked, barrier)
         return (bound[0] + rate) / 2.0 + 0.03
 
     assert buffer(0.5) == pytest.approx(0.05)
@@ -205,7 +207,8 @@ def test_state_and_answers_repeat():
     first, second = shield_of(), shield_of()
     second.restore(first.snapshot())
     asked = command_of(BodyTwist(0.5, 0.05, 0.1))
-    assert first.filter(asked, belief, CAPS) == second.filter(asked, belief, CAPS)
+    one, other = first.filter(asked, belief, CAPS), second.filter(asked, belief, CAPS)
+    assert (one.command, one.diagnostics) == (other.command, other.diagnostics)
 
 
 def test_no_shield_only_clips():
@@ -222,3 +225,60 @@ def test_passage_narrower_than_twice_the_buffered_clearance_is_closed(half_width
     filtered = shield_of().filter(command_of(BodyTwist(0.4, 0.0, 0.0)), belief_of(walls), CAPS)
     assert (filtered.command.base.vx > 0.35) == passes
     assert filtered.diagnostics.infeasible != passes
+
+
+def test_a_single_scalar_barrier_has_no_direction_between_two_closing_walls():
+    """On the medial axis the slope cancels: it is told that the room closes, and not where to go."""
+    walls = [Box(-3, 0.275, 3, 0.5, vy=-0.3), Box(-3, -0.5, 3, -0.225, vy=0.3)]
+    asked = command_of(BodyTwist(0.4, 0.0, 0.0))
+    told = shield_of(form="single_scalar", gate="none").filter(asked, belief_of(walls, SE2(0.0, 0.025)), CAPS)
+    assert told.diagnostics.samples == 1
+    assert told.diagnostics.infeasible
+    assert told.command.base.vx == pytest.approx(0.4, abs=1e-6)
+    assert shield_of().filter(asked, belief_of(walls, SE2(0.0, 0.025)), CAPS).command.base.vx < 0.39
+
+
+@pytest.mark.parametrize("closing", [0.0, 0.3])
+def test_a_single_scalar_barrier_before_one_wall_is_the_closed_form(closing):
+    belief = belief_of([Box(0.4, -3, 1, 3, vx=-closing)])
+    shield = shield_of(form="single_scalar", gate="none", buffer_gain=0.0, buffer_min_m=0.05)
+    vx = shield.filter(command_of(BodyTwist(0.7, 0.0, 0.0)), belief, CAPS).command.base.vx
+    assert vx == pytest.approx(2.0 * (0.4 - 0.22 - 0.05) - closing, abs=0.02)
+
+
+def test_an_object_barrier_reads_tracks_and_knows_no_walls():
+    shield = shield_of(form="objects", gate="none", buffer_gain=0.0)
+    ahead = Track(1, (0.8, 0.0), (-0.2, 0.0), 0.25, np.zeros((4, 4)))
+    belief = belief_of([Box(0.3, -3, 1, 3)])
+    asked = command_of(BodyTwist(0.7, 0.1, 0.0))
+    assert not shield.filter(asked, belief, CAPS).intervened
+    twist = shield.filter(asked, replace(belief, tracks=(ahead,)), CAPS).command.base
+    assert twist.vx == pytest.approx(2.0 * (0.8 - 0.25 - 0.22 - 0.05) - 0.2, abs=1e-9)
+    assert twist.vy == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(("gate", "held"), [("material_derivative", True), ("field_rate", False), ("none", True)])
+def test_only_the_material_derivative_opens_the_gate_for_a_wall_driven_at(gate, held):
+    belief = belief_of([Box(0.40, -3.0, 0.6, 3.0)])  # beyond the guard zone
+    told = shield_of(gate=gate).filter(command_of(BodyTwist(0.6, 0.0, 0.0)), belief, CAPS)
+    assert (told.diagnostics.active > 0) == held
+    assert told.intervened == held
+
+
+def test_without_a_bound_the_buffer_grows_with_what_closes_in():
+    belief = belief_of([Box(0.9, -3.0, 1.2, 3.0, vx=-1.5)])
+    asked = command_of(BodyTwist(0.0, 0.0, 0.0))
+    bounded, unbounded = (
+        shield_of(buffer_max_m=most, gate="none", sample_radius_m=1.2).filter(asked, belief, CAPS).command.base.vx
+        for most in (0.1, None)
+    )
+    assert unbounded - bounded == pytest.approx(-2.0 * (0.3 - 0.1), abs=0.05)
+
+
+def test_what_constrains_is_drawn_where_the_wall_is():
+    filtered = shield_of().filter(command_of(BodyTwist(0.4, 0.0, 0.0)), belief_of([Box(0.3, -3, 0.6, 3)], SE2(0, 0, 1.0)), CAPS)
+    drawn = {drawing.name: drawing for drawing in filtered.drawings}
+    assert len(drawn["boundaries"].points_in_odom) == filtered.diagnostics.samples
+    points = drawn["constraints"].points_in_odom
+    assert len(points) == filtered.diagnostics.active > 0
+    assert points[:, 0] == pytest.approx(0.3, abs=0.03)
