@@ -14,6 +14,7 @@ from drivers.interface.errors import DeviceError
 from drivers.interface.kinematics import WheelKinematics
 from drivers.interface.samples import WheelSample
 from drivers.interface.seeds import stream
+from sim_drivers.actuation_noise import ActuationNoise, ActuationNoiseSettings
 from sim_drivers.drive import Drive, DriveSettings
 from sim_drivers.wheel_encoders import EncoderSettings, WheelEncoders
 from sim_drivers.world import MujocoWorld, require_world
@@ -24,6 +25,7 @@ class WheeledBaseSettings(DriveSettings):
 
     mass_kg: float = Field(default=6.0, gt=0.1, le=500.0, description="of the whole base, wheels included")
     encoders: EncoderSettings = Field(default_factory=EncoderSettings, description="wheel encoders")
+    actuation_noise: ActuationNoiseSettings = ActuationNoiseSettings()
 
 
 class Chassis(Protocol):
@@ -137,7 +139,7 @@ class WheeledBase:
 
     def act(self, world: MujocoWorld) -> None:
         """Move the set point on, and measure the wheels when it is time."""
-        twist = self._drive.step(world.now_ns)
+        twist = self._noise.spoil(self._drive.step(world.now_ns))
         self._chassis.drive(world, self._rates_from_twist @ (twist.vx, twist.vy, twist.wz))
         if self._state is DeviceState.OPEN and self._encoders.due(world.now_ns):
             self._encoders.measure(world.now_ns, self._chassis.wheel_angles(world))
@@ -145,6 +147,8 @@ class WheeledBase:
     def _reset(self) -> None:
         rng = stream(self._setup.seed, f"{self._setup.name}.encoders")
         self._encoders = WheelEncoders(self._settings.encoders, rng, self._kinematics.wheel_count, self._world.now_ns)
+        actuation = stream(self._setup.seed, f"{self._setup.name}.actuation")
+        self._noise = ActuationNoise(self._settings.actuation_noise, actuation, self._chassis.period_ns * 1e-9)
         self._drive.expired = 0
 
 
