@@ -1,5 +1,6 @@
 """Logs of several files: each opens by itself, all are one, and the disk budget spares what is around a stop."""
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,8 +10,9 @@ from drivers.interface.errors import ConfigurationError
 from runtime.cycle import Cycle
 from runtime.faults import Fault, FaultReport, Response
 from runtime.log.opening import reader_of
-from runtime.log.paths import files_of
+from runtime.log.paths import files_of, numbered
 from runtime.log.read import read, read_file
+from runtime.log.repair import repair
 from runtime.log.settings import LogSettings
 from runtime.log.verification import verify
 from runtime.log.verify import sensed_at
@@ -111,6 +113,17 @@ def test_a_missing_file_is_noticed(tmp_path: Path) -> None:
     files[1].unlink()
     assert verify(files[0]).findings[0] == "of its files, 1 are missing"
     assert any("ticks before" in sentence for sentence in verify(files[0]).findings)
+
+
+def test_a_last_file_that_a_killed_writer_had_just_begun_does_not_keep_the_rest_from_being_saved(
+    log: Path, tmp_path: Path
+) -> None:
+    files = [shutil.copy(file, tmp_path) for file in files_of(log)]
+    numbered(tmp_path / "a.rrd", len(files)).touch()
+    saved = repair(tmp_path / "a.rrd")
+    assert saved == tmp_path / "a.repaired.rrd"
+    assert read(saved, "/replay/check").ticks == list(range(80))
+    assert verify(saved).damaged == ()
 
 
 def test_a_budget_holds_at_least_two_files() -> None:
