@@ -5,6 +5,7 @@ import pytest
 import planners
 from planners.dwa.planner import DynamicWindow
 from planners.joint_waypoints.planner import JointWaypoints
+from planners.orca.planner import ReciprocalAvoidance
 from planners.point_ds.planner import PointAttractor
 from planners.routers.grid import GridRouter
 from planners.shields.field_cbf import FieldCbf
@@ -16,6 +17,7 @@ from planners.shields.field_cbf import FieldCbf
         ("dwa", DynamicWindow),
         ("point_ds", PointAttractor),
         ("joint_waypoints", JointWaypoints),
+        ("orca", ReciprocalAvoidance),
         ("routers", GridRouter),
         ("shields", FieldCbf),
     ],
