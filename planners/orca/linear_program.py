@@ -101,4 +101,5 @@ def choose_velocity(normals: F64, bounds: F64, hard: int, wanted: F64) -> tuple[
     if met == len(bounds):
         return best, 0.0
     _, start = nearest_inside(normals[:hard], bounds[:hard], wanted)
-    return least_violation(normals, bounds, hard, start)
+    best, granted = least_violation(normals, bounds, hard, start)
+    return best, granted

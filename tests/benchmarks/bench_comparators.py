@@ -1,4 +1,4 @@
-"""One call of each comparator of the RCSP paper: a walled corridor with a pillar, and six walkers among which the robot drives."""
+"""One call of each comparator of the RCSP paper: a walled corridor with a pillar, and six walkers around the robot."""
 
 from collections.abc import Callable
 from dataclasses import replace
