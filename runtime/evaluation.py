@@ -19,12 +19,15 @@ class EvaluationTable:
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     json: str  # every single result
+    title: str = ""  # of one table of several; empty: the evaluation's own
+    further: tuple[EvaluationTable, ...] = ()  # that follow this one; their results are in its JSON
 
     def markdown(self) -> str:
-        """Return the table as Markdown."""
-        lines = [f"| {' | '.join(self.head)} |", "|" + "---|" * len(self.head)]
+        """Return the tables as Markdown."""
+        lines = [f"**{self.title}**", ""] if self.title else []
+        lines += [f"| {' | '.join(self.head)} |", "|" + "---|" * len(self.head)]
         lines += [f"| {' | '.join(row)} |" for row in self.rows]
-        return "\n".join(lines) + "\n"
+        return "\n".join(("\n".join(lines) + "\n", *(one.markdown() for one in self.further)))
 
 
 class Evaluation(Protocol):
@@ -50,19 +53,23 @@ class Evaluation(Protocol):
         ...
 
 
-def load_evaluation(name_or_path: str, seeds: int | None, changes: tuple[str, ...]) -> Evaluation:
+def load_evaluation(name_or_path: str, seeds: int | None, changes: tuple[str, ...], only: tuple[str, ...] = ()) -> Evaluation:
     """Read an experiment by path or shipped name; without a `kind` it is one of `runs`.
+
+    `only` takes the place of the key of that name, which kinds of several tables have.
 
     Raises:
         ConfigurationError: with file and key.
     """
-    from runtime.experiment import RunsEvaluation  # noqa: PLC0415 - each kind knows this contract
+    from runtime.clearance_evaluation import ClearanceEvaluation  # noqa: PLC0415 - each kind knows this contract
+    from runtime.experiment import RunsEvaluation  # noqa: PLC0415
     from runtime.odometry_evaluation import OdometryEvaluation  # noqa: PLC0415
     from runtime.perception_evaluation import PerceptionEvaluation  # noqa: PLC0415
     from runtime.registration_evaluation import RegistrationEvaluation  # noqa: PLC0415
 
     kinds: dict[str, type[Evaluation]] = {
         "runs": RunsEvaluation,
+        "clearance": ClearanceEvaluation,
         "odometry": OdometryEvaluation,
         "perception": PerceptionEvaluation,
         "registration": RegistrationEvaluation,
@@ -70,6 +77,8 @@ def load_evaluation(name_or_path: str, seeds: int | None, changes: tuple[str, ..
     path = yaml_files.find(name_or_path, "experiments")
     content = yaml_files.read(path, "experiments")
     chosen = str(content.pop("kind", "runs"))
+    if only:
+        content["only"] = list(only)
     if chosen not in kinds:
         raise ConfigurationError(f"{path}: kind: {unknown_name('kind of experiment', chosen, kinds)}")
     try:

@@ -7,7 +7,6 @@ Egocentric Sensing.  README.md beside this file says what differs and why.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -21,6 +20,7 @@ from estimators.field_query import sample
 from planners.clearance_manifold.chart import Chart, lay_chart
 from planners.clearance_manifold.control_kernels import brakable, known_length
 from planners.clearance_manifold.controller import ManifoldController, Situation
+from planners.clearance_manifold.diagnostics import ManifoldDiagnostics
 from planners.clearance_manifold.extraction import Scene, Solver
 from planners.clearance_manifold.manifold import Manifold, Stations
 from planners.clearance_manifold.prediction import ArrivalField, Predicted
@@ -29,37 +29,11 @@ from planners.clearance_manifold.ridge_kernels import Ground, Sections
 from planners.clearance_manifold.settings import ClearanceManifoldSettings
 from planners.clearance_manifold.tracker import Continuation, Tracker, heading
 from planners.clearance_manifold.warm_up import rehearse
-from planners.planner import Diagnostics, Drawing, Plan, PlannerSetup
+from planners.planner import Drawing, Plan, PlannerSetup
 from planners.router import Route
 
 LOOK_AT_MOST_DEG = 120.0  # what closes in from behind is not turned to
 UNKNOWN_GAP_M = 0.15  # shorter stretches of unknown cells are holes in a depth image, not the edge of what was seen
-
-
-@dataclass(frozen=True, slots=True)
-class ManifoldDiagnostics(Diagnostics):
-    """The outcome of a tick."""
-
-    fallback_category: str = "none"  # M3
-    trigger: str = ""
-    stopped: str = ""  # why it asks to stand
-    tracking: bool = False
-    utilisation: float = 0.0  # M1, share of the run's ticks so far that continued
-    deviation_m: float = 0.0  # M2
-    reach_m: float = 0.0
-    free_m: float = 0.0
-    rho_ridge_m: float = 0.0
-    margin_m: float = 0.0
-    commitment: float = 0.0  # a_pred
-    speed_m_s: float = 0.0  # k_parallel
-    error_m: float = 0.0  # |e_perp|
-    bound_m: float = 0.0  # v_gamma / k_perp
-    p1: bool = False
-    p2: bool = False
-    p3: bool = False
-    p4: bool = False
-    p5: bool = False
-    p6: bool = True
 
 
 class ClearanceManifold:
@@ -102,7 +76,7 @@ class ClearanceManifold:
             self._chart = None
             self._tracker.reset()
             self._asked = BodyTwist()
-            return Plan(BodyTwist(), diagnostics=ManifoldDiagnostics(stopped=reason))
+            return Plan(BodyTwist(), diagnostics=ManifoldDiagnostics(fallback_category="", stopped=reason))
         pose = belief.odom_from_base
         point = self._control_point(pose)
         new_goal = self._follow_route(route, point)

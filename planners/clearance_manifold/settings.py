@@ -91,7 +91,7 @@ class ControllerSettings(Settings):
     heading_look_ahead_m: float = Field(
         default=1.0, gt=0.0, le=10.0, description="the heading is that of the manifold up to here"
     )
-    smoothing_s: float = Field(default=0.15, ge=0.0, le=2.0, description="time constant of the velocity asked")
+    smoothing_s: float = Field(default=0.0, ge=0.0, le=2.0, description="time constant of the velocity asked")
     yield_m: float = Field(
         default=0.60, ge=0.0, le=3.0, description="between the robot and the middle of what closes in; 0: it does not yield"
     )

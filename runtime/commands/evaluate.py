@@ -19,22 +19,26 @@ def evaluate(
     seeds: Annotated[int | None, typer.Option(min=1, help="run seeds 0 to N - 1; default: the experiment's")] = None,
     jobs: Annotated[int, typer.Option(min=1, help="runs side by side")] = os.cpu_count() or 1,
     changes: Annotated[list[str] | None, typer.Option("--set", metavar="a.b=c", help="override a value in every run")] = None,
+    only: Annotated[
+        list[str] | None, typer.Option(help="of an experiment with several tables, make this one; may be repeated")
+    ] = None,
     json: Annotated[Path | None, typer.Option(help="write every run's report here")] = None,
     markdown: Annotated[Path | None, typer.Option(help="write the table here as Markdown")] = None,
 ) -> None:
     """Run an experiment over its seeds and print its table beside the published figures."""
     from runtime.evaluation import load_evaluation
 
-    evaluation = load_evaluation(experiment, seeds, tuple(changes or ()))
+    evaluation = load_evaluation(experiment, seeds, tuple(changes or ()), tuple(only or ()))
     require_writable(json, "--json")
     require_writable(markdown, "--markdown")
     with Progress(console=console) as progress:
         task = progress.add_task(evaluation.title, total=evaluation.steps)
         found = evaluation.run(jobs, lambda: progress.advance(task))
-    table = Table(*found.head, title=evaluation.title)
-    for row in found.rows:
-        table.add_row(*row)
-    console.print(table)
+    for one in (found, *found.further):
+        table = Table(*one.head, title=one.title or evaluation.title)
+        for row in one.rows:
+            table.add_row(*row)
+        console.print(table)
     if json is not None:
         write_text(json, found.json)
     if markdown is not None:
