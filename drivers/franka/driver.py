@@ -11,13 +11,13 @@ from drivers.franka.session import SAMPLE
 from drivers.franka.settings import FrankaSettings
 from drivers.interface.arm_motion import PANDA
 from drivers.interface.commands import JointLimits, JointTrajectory
-from drivers.interface.devices import DeviceHealth, DeviceIdentity, DeviceSetup
+from drivers.interface.devices import DeviceSetup
 from drivers.interface.errors import DeviceError
-from drivers.interface.samples import JointSample, Stamp, frozen_array
+from drivers.interface.samples import JointSample, frozen_array
 from drivers.interface.settings import Settings
 from drivers.io.channels import MemorySpec, RingSpec
-from drivers.io.host_clock import HostClock
-from drivers.io.process import IoProcess, IoSpec
+from drivers.io.device import WireDevice
+from drivers.io.process import IoSpec
 
 MEMORY = MemorySpec((RingSpec("joints", SAMPLE, 2048),), (), command_values=CAPACITY)
 LONGEST_REQUEST_S = 6.0  # a recovery takes its time, and meanwhile the process waits
@@ -33,43 +33,33 @@ class ExchangeFigures:
     states_lost: int  # that the controller sent and that never came, or came together
 
 
-class FrankaArm:
-    """A Franka arm behind the contract of an arm; its 1 kHz exchange is a process of its own."""
+class FrankaArm(WireDevice):
+    """A Franka arm behind the contract of an arm; its 1 kHz exchange is a process of its own.
+
+    The operator's reset recovers it from a reflex.
+    """
 
     Settings: ClassVar[type[Settings]] = FrankaSettings
     role: ClassVar[str] = "arm"
-    real_time: ClassVar[bool] = True
+    what: ClassVar[str] = "Franka arm"
     model: ClassVar[str] = "models/panda.urdf"  # in configs, for the log
 
     def __init__(self, settings: FrankaSettings, setup: DeviceSetup) -> None:
         """Remember; nothing is touched."""
-        self._settings = settings
-        self._setup = setup
-        self._clock = HostClock(setup.now_ns)
-        self._io = IoProcess(
-            IoSpec(
-                setup.name,
-                "drivers.franka.session:FrankaSession",
-                settings,
-                MEMORY,
-                open_s=settings.open_timeout_s,
-                silent_s=LONGEST_REQUEST_S,
-            )
+        spec = IoSpec(
+            setup.name,
+            "drivers.franka.session:FrankaSession",
+            settings,
+            MEMORY,
+            open_s=settings.open_timeout_s,
+            silent_s=LONGEST_REQUEST_S,
         )
+        super().__init__(setup, spec, "joints", settings.decimation * 1_000_000)
 
     @property
     def limits(self) -> JointLimits:
         """What it may be asked."""
         return PANDA
-
-    def open(self) -> None:
-        """Connect to the controller; nothing moves.
-
-        Raises:
-            DeviceError: pylibfranka is missing, nobody answers, or the controller refuses.
-        """
-        self._setup.now_ns()
-        self._io.open()
 
     def command(self, trajectory: JointTrajectory, expires_ns: int) -> None:
         """Follow the trajectory until `expires_ns`, then decelerate to rest.
@@ -86,53 +76,17 @@ class FrankaArm:
 
     def drain(self) -> tuple[JointSample, ...]:
         """Return the joint samples that have arrived since the last call, oldest first."""
-        if not self._io.is_open:
+        if (drained := self._drained()) is None:
             return ()
-        records = self._io.ring("joints").drain()
-        if not len(records):
-            return ()
-        offset_ns = self._clock.offset_ns()
-        captured_ns, received_ns = ((records[name] + offset_ns).tolist() for name in ("captured_ns", "received_ns"))
-        stamps = map(Stamp, captured_ns, received_ns, records["sequence"].tolist())
+        stamps, records = drained
         joints = (frozen_array(records[name].copy()) for name in ("position_rad", "velocity_rad_s", "torque_nm"))  # (n, 7)
         return tuple(map(JointSample, stamps, *joints))
-
-    def stop(self) -> None:
-        """Decelerate to rest."""
-        self._io.stop()
-
-    def close(self) -> None:
-        """Decelerate to rest and hang up."""
-        self._io.close()
-
-    def clear_faults(self) -> None:
-        """Recover from a reflex and take commands again."""
-        self._io.clear_faults()
-
-    def health(self) -> DeviceHealth:
-        """Say how it stands."""
-        record = self._io.health()
-        return DeviceHealth(
-            device=self._setup.name,
-            state=record.state,
-            fault=record.fault,
-            received=self._io.ring("joints").written,
-            dropped=record.dropped,
-            overflowed=self._io.ring("joints").overflowed,
-            expired_commands=record.expired_commands,
-            expected_period_ns=self._settings.decimation * 1_000_000,
-        )
 
     @property
     def exchange(self) -> ExchangeFigures:
         """How well the exchange keeps up."""
         kept, resumed, cycles, states_lost = self._io.health().figures[:4]
         return ExchangeFigures(_count(cycles), kept, _count(resumed), _count(states_lost))
-
-    def identity(self) -> DeviceIdentity:
-        """Return who answers."""
-        record = self._io.health()
-        return DeviceIdentity(self._setup.name, "Franka arm", record.firmware, record.protocol)
 
 
 def _count(figure: float) -> int:

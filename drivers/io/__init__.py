@@ -10,7 +10,8 @@ wire still sends zero.  In ten lines:
     `port.health` (`received`, `dropped`, `state`, `fault`, `battery_v`, `firmware`, ...); the shell publishes that.
 3.  It raises `DeviceError` or `OSError` when the wire is lost: the shell rests and closes it, says RECONNECTING, and opens it
     again with back-off; `port.reopened` is then true, and what moves must not arm itself before `clear_faults()`.
-4.  The driver holds `io = IoProcess(IoSpec(name, "drivers.my.session:MySession", settings, MemorySpec(...)))`.
+4.  The driver derives from `WireDevice` (`device.py`), or holds `io = IoProcess(IoSpec(name, "drivers.my.session:MySession",
+    settings, MemorySpec(...)))` itself.
 5.  `io.open()` starts the child and returns once the session is open, or raises `DeviceError` with the child's own sentence.
 6.  `io.command(values, expires_ns)` hands over float64 values that the child sends at most once, and for no longer than they are
     valid; then it calls `rest()`.  `io.stop()` rests now.  Times are CLOCK_MONOTONIC: convert the loop's with `HostClock`.

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from drivers.interface.devices import DeviceState
+from drivers.interface.devices import DeviceHealth, DeviceIdentity, DeviceState
 from drivers.interface.shared_memory import Block, Seqlock
+from drivers.interface.shared_ring import SharedRing
 
 FIGURES = 32
 STATES = tuple(DeviceState)
@@ -35,6 +36,26 @@ class HealthRecord:
     protocol: str = ""
     serial: str = ""
     figures: list[float] = field(default_factory=lambda: [math.nan] * FIGURES)  # what else the device's doctor asks, in its order
+
+    def of_device(self, name: str, expected_period_ns: int, *rings: SharedRing) -> DeviceHealth:
+        """Return how the device of this name stands, whose samples come through these rings."""
+        return DeviceHealth(
+            device=name,
+            state=self.state,
+            fault=self.fault,
+            received=sum(ring.written for ring in rings),
+            dropped=self.dropped,
+            overflowed=sum(ring.overflowed for ring in rings),
+            expired_commands=self.expired_commands,
+            expected_period_ns=expected_period_ns,
+            battery_fraction=_known(self.battery_fraction),
+            battery_v=_known(self.battery_v),
+            bus_load=_known(self.bus_load),
+        )
+
+    def identity(self, name: str, model: str) -> DeviceIdentity:
+        """Return what the device of this name has told of itself."""
+        return DeviceIdentity(name, model, self.firmware, self.protocol, self.serial)
 
 
 def _type_of(name: str, annotation: str) -> tuple[str, str] | tuple[str, str, tuple[int]]:
@@ -80,6 +101,10 @@ class HealthBlock:
         if version != self._seen and (rows := self._lock.read(self._record.copy)) is not None:
             self._newest, self._seen = _unpacked(rows[0].item()), version
         return self._newest
+
+
+def _known(value: float) -> float | None:
+    return None if math.isnan(value) else value
 
 
 def _packed(value: object) -> object:

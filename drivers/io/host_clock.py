@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from itertools import repeat
+
+from drivers.interface.samples import Stamp
+from drivers.interface.shared_ring import Records
 
 TOLERANCE_NS = 20_000  # a reading that took longer was interrupted and says nothing
 
@@ -23,6 +27,15 @@ class HostClock:
     def to_loop(self, host_ns: int) -> int:
         """Return a time of CLOCK_MONOTONIC on the loop's clock."""
         return host_ns + self.offset_ns()
+
+    def stamps(self, records: Records, clocks: Iterable[str] | None = None) -> list[Stamp]:
+        """Return the stamps of records that have `captured_ns` and `received_ns` on CLOCK_MONOTONIC, and a `sequence`.
+
+        `clocks` names each one's own clock; none: they are all the host's.
+        """
+        offset_ns = self.offset_ns()
+        captured_ns, received_ns = ((records[name] + offset_ns).tolist() for name in ("captured_ns", "received_ns"))
+        return [*map(Stamp, captured_ns, received_ns, records["sequence"].tolist(), clocks or repeat("host"))]
 
     def offset_ns(self) -> int:
         """Return the difference; it stays the same number as long as it is the same within what can be measured."""

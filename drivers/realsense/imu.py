@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from drivers.interface.devices import DeviceHealth, DeviceIdentity, DeviceSetup
 from drivers.interface.geometry import BODY_FROM_OPTICAL, SE3
-from drivers.interface.samples import ImuSample, Stamp
+from drivers.interface.samples import ImuSample
 from drivers.interface.settings import Settings
 from drivers.io.host_clock import HostClock
 from drivers.realsense.link import health_of, identity_of, link_of
@@ -64,10 +64,7 @@ class RealSenseImu:
         records = self._lease.it.io.ring("motion").drain()
         if not len(records):
             return ()
-        offset_ns = self._clock.offset_ns()
-        captured_ns, received_ns = ((records[name] + offset_ns).tolist() for name in ("captured_ns", "received_ns"))
-        clocks = [DOMAINS[domain] for domain in records["domain"].tolist()]
-        stamps = map(Stamp, captured_ns, received_ns, records["sequence"].tolist(), clocks)
+        stamps = self._clock.stamps(records, [DOMAINS[domain] for domain in records["domain"].tolist()])
         gyro, accel = ((records[name] @ self._base_from_optical.T).tolist() for name in ("gyro_rad_s", "accel_m_s2"))
         return tuple(map(ImuSample, stamps, map(tuple, gyro), map(tuple, accel)))
 

@@ -72,4 +72,4 @@ def health_of(name: str, lease: Lease[CameraLink], dropped: Figure) -> DeviceHea
 def identity_of(name: str, lease: Lease[CameraLink]) -> DeviceIdentity:
     """Return what the camera has told of itself."""
     record = lease.it.io.health()
-    return DeviceIdentity(name, "", record.firmware, record.protocol, record.serial and f"serial number {record.serial}")
+    return replace(record.identity(name, ""), serial=record.serial and f"serial number {record.serial}")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,37 +142,21 @@ class Channel:
         for name in self._names if self.is_open else ():
             records = self.link.io.ring(name).drain()
             if len(records):
-                offset_ns = self._clock.offset_ns()
-                captured_ns, received_ns = ((records[key] + offset_ns).tolist() for key in ("captured_ns", "received_ns"))
-                yield name, [*map(Stamp, captured_ns, received_ns, records["sequence"].tolist())], records
+                yield name, self._clock.stamps(records), records
 
     def health(self) -> DeviceHealth:
         """Say how it stands."""
         if not self.link.started:
             return DeviceHealth(self._setup.name, DeviceState.CLOSED, expected_period_ns=self._period_ns)
-        record = self.link.io.health()
-        rings = [self.link.io.ring(name) for name in self._names]
-        return DeviceHealth(
-            device=self._setup.name,
-            state=record.state if self.is_open else DeviceState.CLOSED,
-            fault=record.fault if self.is_open else "",
-            received=sum(ring.written for ring in rings),
-            dropped=record.dropped,
-            overflowed=sum(ring.overflowed for ring in rings),
-            expired_commands=record.expired_commands if self._moves else 0,
-            expected_period_ns=self._period_ns,
-            battery_fraction=_known(record.battery_fraction),
-            battery_v=_known(record.battery_v),
-            bus_load=_known(record.bus_load),
-        )
+        rings = (self.link.io.ring(name) for name in self._names)
+        health = self.link.io.health().of_device(self._setup.name, self._period_ns, *rings)
+        if not self.is_open:
+            health = replace(health, state=DeviceState.CLOSED, fault="")
+        return health if self._moves else replace(health, expired_commands=0)
 
     def identity(self, model: str) -> DeviceIdentity:
         """Return what the autopilot has told of itself."""
         if not self.link.started:
             return DeviceIdentity(self._setup.name, model)
         record = self.link.io.health()
-        return DeviceIdentity(self._setup.name, model, record.firmware, record.protocol, record.serial)
-
-
-def _known(value: float) -> float | None:
-    return None if math.isnan(value) else value
+        return record.identity(self._setup.name, model)

@@ -52,8 +52,7 @@ class RealSenseImuFirmware:
         inside = ImuSettings(rate_hz=d.gyro_rate_hz, **s.model_dump(exclude={"clock_offset_s", "clock_drift", "faults"}))
         self._imu = SimImu(inside, setup.device("imu"))
         self._port = CameraPort(MotionWire, d.memory, "motion", setup.name)
-        self._faults = CameraFaults(settings.faults)
-        self._losses = stream(setup.seed, f"{setup.name}.faults")
+        self._faults = CameraFaults(settings.faults, stream(setup.seed, f"{setup.name}.faults"))
         self._opened = False
         setup.world.add(self)
 
@@ -94,9 +93,8 @@ class RealSenseImuFirmware:
             return
         wire = self._port.wire or self._port.open()
         s, shift_ns = self._settings, self._setup.host.now_ns - world.now_ns
-        dropping = self._faults.active("drop", world.scene_ns)
         for sample in samples:
-            if dropping is not None and self._losses.random() < dropping.probability:
+            if self._faults.hits("drop", world.scene_ns):
                 continue
             stamp_us = device_us(sample.stamp.captured_ns + shift_ns, s.clock_offset_s, s.clock_drift)
             gyro, accel = (self._optical_from_base @ np.array(v) for v in (sample.gyro_rad_s, sample.accel_m_s2))

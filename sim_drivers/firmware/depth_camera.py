@@ -89,8 +89,7 @@ class RealSenseFirmware:
         self._stream = intrinsics(wire.width, wire.height)
         self._camera = _camera(driver_settings, settings, setup, decimated(self._stream, wire.filters.decimation))
         self._port = CameraPort(DepthWire, wire.memory, "depth", setup.name)
-        self._faults = CameraFaults(settings.faults)
-        self._losses = stream(setup.seed, f"{setup.name}.faults")
+        self._faults = CameraFaults(settings.faults, stream(setup.seed, f"{setup.name}.faults"))
         self._waiting: deque[tuple[int, DepthFrame, int]] = deque()  # when it is due, the frame, its stamp by the camera's clock
         self._frozen: tuple[DepthFrame, int] | None = None
         self._opened = False
@@ -148,8 +147,7 @@ class RealSenseFirmware:
         return world.now_ns + self._faults.shift_ns("delay", scene_ns), frame, device_us(captured_ns, ahead_s, s.clock_drift)
 
     def _send(self, frame: DepthFrame, stamp_us: int, scene_ns: int) -> None:
-        dropping = self._faults.active("drop", scene_ns)
-        if dropping is not None and self._losses.random() < dropping.probability:
+        if self._faults.hits("drop", scene_ns):
             return
         if not self._faults.active("freeze", scene_ns) or self._frozen is None:
             self._frozen = frame, stamp_us

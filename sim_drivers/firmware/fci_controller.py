@@ -12,7 +12,8 @@ from pydantic import Field
 from drivers.interface.seeds import stream
 from drivers.interface.settings import Settings
 from sim_drivers.arm_model import MODEL, ArmBuild, PandaJoints
-from sim_drivers.firmware.fci_faults import FciFault, FciFaults
+from sim_drivers.firmware.fault_script import FaultScript
+from sim_drivers.firmware.fci_faults import FciFault
 from sim_drivers.firmware.fci_machine import Command, Machine
 from sim_drivers.firmware.fci_motion import CYCLE_NS
 from sim_drivers.firmware.fci_port import FciPort
@@ -66,7 +67,7 @@ class FciController:
         self._port = FciPort(setup.name, driver_settings.host)
         self._port.version = settings.protocol_version
         self._urdf = resources.files("configs").joinpath(MODEL).read_bytes()
-        self._faults = FciFaults(settings.faults, stream(setup.seed, f"{setup.name}.faults"))
+        self._faults = FaultScript(settings.faults, stream(setup.seed, f"{setup.name}.faults"))
         self._rng = stream(setup.seed, f"{setup.name}.joints")
         self.machine = Machine(np.array(settings.start_rad), self._motion_ended, self._recovered)
         self.told = False  # whether the newest state is on its way to a client
@@ -106,7 +107,7 @@ class FciController:
     def act(self, world: MujocoWorld) -> None:
         """One cycle of a millisecond: hear, decide, drive, tell."""
         scene_ns = world.scene_ns
-        silent = self._faults.on("silent", scene_ns)
+        silent = self._faults.active("silent", scene_ns) is not None
         if not silent:
             for asked in self._port.requests():
                 self._serve(asked, world)
@@ -117,7 +118,7 @@ class FciController:
         self._joints.drive(world, self.machine.set_point.position_rad, self.machine.set_point.velocity_rad_s)
         self._look(world, scene_ns)
         self._state["message_id"] += 1
-        self.told = self._port.is_connected and not silent and not self._faults.loses("lose_states", scene_ns)
+        self.told = self._port.is_connected and not silent and not self._faults.hits("lose_states", scene_ns)
         if self.told:
             self._port.send(self._state.tobytes())
         for asked, status in self._outbox:
@@ -137,7 +138,7 @@ class FciController:
         newest = int(self._state["message_id"][0])
         found: Command | None = None
         for command in self._port.commands():
-            if int(command["message_id"][0]) == newest and not self._faults.loses("lose_commands", scene_ns):
+            if int(command["message_id"][0]) == newest and not self._faults.hits("lose_commands", scene_ns):
                 found = command
         return found
 
@@ -174,7 +175,7 @@ class FciController:
     def _strike(self, world: MujocoWorld) -> None:
         """Let happen by itself what the script says, or what the arm has run into."""
         scene_ns = world.scene_ns
-        self.machine.press_user_stop(pressed=self._faults.on("user_stop", scene_ns))
+        self.machine.press_user_stop(pressed=self._faults.active("user_stop", scene_ns) is not None)
         hit = (np.abs(self._joints.external_nm(world)) > self._reflex_nm).any()
         if (hit and self.machine.is_moving) or self._faults.strikes("reflex", scene_ns):
             self.machine.reflex(Error.JOINT_REFLEX)
@@ -186,12 +187,12 @@ class FciController:
     def _look(self, world: MujocoWorld, scene_ns: int) -> None:
         """Fill in the state; where the world has not moved on, the joints are measured as before."""
         state, machine = self._state, self.machine
-        if world.now_ns != self._measured_ns and not self._faults.on("freeze", scene_ns):
+        if world.now_ns != self._measured_ns and not self._faults.active("freeze", scene_ns):
             self._measured_ns = world.now_ns
             state["q"], state["dq"], state["tau_J"] = self._joints.measure(world, self._rng)
             state["theta"], state["dtheta"] = state["q"], state["dq"]
             state["tau_ext_hat_filtered"] = self._joints.external_nm(world)
-        if self._faults.on("nan", scene_ns):
+        if self._faults.active("nan", scene_ns):
             state["q"] = np.nan
         point = machine.set_point
         state["q_d"], state["dq_d"], state["ddq_d"] = point.position_rad, point.velocity_rad_s, point.acceleration_rad_s2

@@ -9,10 +9,9 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from drivers.interface.settings import Settings
 from sim_drivers.firmware.can_simple import Command, Frame
+from sim_drivers.firmware.fault_script import Fault, FaultScript
 
-SECOND_NS = 1_000_000_000
 ESTIMATES = (Command.GET_ENCODER_ESTIMATES, Command.GET_BUS_VOLTAGE_CURRENT, Command.GET_IQ)
 
 Kind = Literal[
@@ -21,7 +20,7 @@ Kind = Literal[
 ]  # fmt: skip
 
 
-class FrameFault(Settings):
+class FrameFault(Fault):
     """One misbehaviour of one axis, or of all."""
 
     kind: Kind = Field(
@@ -29,54 +28,37 @@ class FrameFault(Settings):
         "truncate: the payload; wrong_node: under another identifier; silent: sends nothing; deaf: hears nothing; flood: foreign "
         "frames; estop, drive: a fault of its own, once; reboot: powers up anew, once"
     )
-    from_s: float = Field(default=0.0, ge=0.0, le=1e6, description="after the walkers set off")
-    until_s: float = Field(default=1e6, gt=0.0, le=1e6, description="its end")
     node: int | None = Field(default=None, ge=0, le=63, description="of the axis; none: all of them")
-    probability: float = Field(default=0.5, ge=0.0, le=1.0, description="of drop, corrupt and truncate, for each frame")
     flood_per_s: float = Field(default=2000.0, gt=0.0, le=20_000.0, description="foreign frames a second")
 
-    def active(self, scene_ns: int, node: int) -> bool:
-        """Whether an axis misbehaves like this at a time of the run."""
-        return self.from_s * SECOND_NS <= scene_ns < self.until_s * SECOND_NS and self.node in (None, node)
+    def concerns(self, node: int | None) -> bool:
+        """Whether it is this axis that misbehaves."""
+        return self.node is None or node is None or self.node == node
 
 
-class FrameFaults:
+class FrameFaults(FaultScript[FrameFault]):
     """Applies a script to the frames that axes send."""
 
     def __init__(self, script: tuple[FrameFault, ...], rng: np.random.Generator) -> None:
         """Take the script; what is left to chance is drawn from `rng`, in the order of the frames."""
-        self._script = script
-        self._rng = rng
+        super().__init__(script, rng)
         self._frozen: dict[int, bytes] = {}  # by identifier
-        self._done: set[tuple[int, int]] = set()  # (entry, node) of what happens once
         self._flooded = 0.0
 
     def sent(self, frame: Frame, scene_ns: int) -> Frame | None:
         """Return what a frame has become when it leaves the axis; None: it never does."""
         result: Frame | None = frame
-        for fault in self._script:
-            if result is not None and fault.active(scene_ns, frame.node):
+        for fault in self.going_on(scene_ns, frame.node):
+            if result is not None:
                 result = self._changed(result, fault)
-        if not any(f.kind == "freeze" and f.active(scene_ns, frame.node) for f in self._script):
+        if self.active("freeze", scene_ns, frame.node) is None:
             self._frozen.pop(frame.identifier, None)
         return result
 
-    def deaf(self, node: int, scene_ns: int) -> bool:
-        """Whether an axis hears nothing."""
-        return any(fault.kind == "deaf" and fault.active(scene_ns, node) for fault in self._script)
-
-    def strikes(self, kind: Kind, node: int, scene_ns: int) -> bool:
-        """Whether something that happens once (estop, drive, reboot) happens to an axis now."""
-        for entry, fault in enumerate(self._script):
-            if fault.kind == kind and fault.active(scene_ns, node) and (entry, node) not in self._done:
-                self._done.add((entry, node))
-                return True
-        return False
-
     def flood(self, scene_ns: int, elapsed_s: float) -> list[Frame]:
         """Return foreign frames that have come since the last call."""
-        for fault in self._script:
-            if fault.kind == "flood" and fault.active(scene_ns, -1 if fault.node is None else fault.node):
+        for fault in self.going_on(scene_ns):
+            if fault.kind == "flood":
                 self._flooded += fault.flood_per_s * elapsed_s
         count, self._flooded = int(self._flooded), self._flooded % 1.0
         return [Frame(63, 0x1F, self._rng.bytes(8)) for _ in range(count)]
@@ -100,6 +82,3 @@ class FrameFaults:
             case "wrong_node":
                 return replace(frame, node=(frame.node + 32) % 64)
         return frame
-
-    def _chance(self, fault: FrameFault) -> bool:
-        return bool(self._rng.random() < fault.probability)

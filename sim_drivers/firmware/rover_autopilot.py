@@ -303,7 +303,7 @@ class RoverAutopilot:
     def _meddle(self, now_ns: int, scene_ns: int) -> None:
         """Send what others send: a second vehicle, or somebody without the key."""
         for kind, system in (("other_system", OTHER_SYSTEM), ("forge", self._wire.system_id)):
-            if self._faults.active(kind, scene_ns) and now_ns % 50_000_000 < self.period_ns:  # type: ignore[arg-type]
+            if self._faults.active(kind, scene_ns) and now_ns % 50_000_000 < self.period_ns:
                 stranger = mavlink.MAVLink(None, srcSystem=system, srcComponent=1)
                 self._port.send(bytes(self._voice.heartbeat(RoverState(self._settings, 0), now_ns).pack(stranger)))
 

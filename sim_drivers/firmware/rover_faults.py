@@ -7,9 +7,8 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from drivers.interface.settings import Settings
+from sim_drivers.firmware.fault_script import Fault, FaultScript
 
-SECOND_NS = 1_000_000_000
 REMEMBERED = 64  # frames that a replay plays again
 
 Kind = Literal[
@@ -18,7 +17,7 @@ Kind = Literal[
 ]  # fmt: skip
 
 
-class LinkFault(Settings):
+class LinkFault(Fault):
     """One misbehaviour."""
 
     kind: Kind = Field(
@@ -27,36 +26,17 @@ class LinkFault(Settings):
         "all that it measures of its motion; clock_jump: its clock goes ahead, once; disconnect: the connection is cut, once; "
         "disarm, leave_mode, reboot: by itself, once"
     )
-    from_s: float = Field(default=0.0, ge=0.0, le=1e6, description="after the walkers set off")
-    until_s: float = Field(default=1e6, gt=0.0, le=1e6, description="its end")
     probability: float = Field(default=0.3, ge=0.0, le=1.0, description="of drop, corrupt and truncate, for each frame")
 
-    def active(self, scene_ns: int) -> bool:
-        """Whether it misbehaves like this at a time of the run."""
-        return self.from_s * SECOND_NS <= scene_ns < self.until_s * SECOND_NS
 
-
-class LinkFaults:
+class LinkFaults(FaultScript[LinkFault]):
     """Applies a script to what an autopilot sends."""
 
     def __init__(self, script: tuple[LinkFault, ...], rng: np.random.Generator) -> None:
         """Take the script; what is left to chance is drawn from `rng`, in the order of the frames."""
-        self._script, self._rng = script, rng
-        self._done: set[int] = set()
+        super().__init__(script, rng)
         self._sent: list[bytes] = []
         self._replayed = 0
-
-    def active(self, kind: Kind, scene_ns: int) -> bool:
-        """Whether a kind of misbehaviour goes on."""
-        return any(fault.kind == kind and fault.active(scene_ns) for fault in self._script)
-
-    def strikes(self, kind: Kind, scene_ns: int) -> bool:
-        """Whether something that happens once happens now."""
-        for entry, fault in enumerate(self._script):
-            if fault.kind == kind and fault.active(scene_ns) and entry not in self._done:
-                self._done.add(entry)
-                return True
-        return False
 
     def sent(self, frame: bytes, scene_ns: int) -> list[bytes]:
         """Return what is on the wire instead of a frame."""
@@ -65,9 +45,8 @@ class LinkFaults:
         if self.active("silent", scene_ns):
             return []
         result = [frame]
-        for fault in self._script:
-            if fault.active(scene_ns):
-                result = self._changed(fault, result)
+        for fault in self.going_on(scene_ns):
+            result = self._changed(fault, result)
         self._sent = [*self._sent, frame][-REMEMBERED:]
         return result
 
@@ -89,6 +68,3 @@ class LinkFaults:
     def _bent(self, frame: bytes) -> bytes:
         place = int(self._rng.integers(1, len(frame)))
         return frame[:place] + bytes((frame[place] ^ int(self._rng.integers(1, 256)),)) + frame[place + 1 :]
-
-    def _chance(self, fault: LinkFault) -> bool:
-        return bool(self._rng.random() < fault.probability)

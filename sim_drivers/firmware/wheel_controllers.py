@@ -177,7 +177,7 @@ class WheelControllers:
             if frame.node not in self._nodes or world.now_ns < self._ready_ns:
                 continue
             index = self._nodes.index(frame.node)
-            if self._faults.deaf(frame.node, world.scene_ns):
+            if self._faults.active("deaf", world.scene_ns, frame.node):
                 continue
             if frame.command == Command.REBOOT:
                 self._reboot(world, index)
@@ -189,11 +189,11 @@ class WheelControllers:
     def _strike(self, world: MujocoWorld) -> None:
         """Let happen by itself what the script says."""
         for index, node in enumerate(self._nodes):
-            if self._faults.strikes("estop", node, world.scene_ns):
+            if self._faults.strikes("estop", world.scene_ns, node):
                 self._axes[index].fail(Fault.ESTOP)
-            if self._faults.strikes("drive", node, world.scene_ns):
+            if self._faults.strikes("drive", world.scene_ns, node):
                 self._axes[index].fail(Fault.DRIVE)
-            if self._faults.strikes("reboot", node, world.scene_ns):
+            if self._faults.strikes("reboot", world.scene_ns, node):
                 self._reboot(world, index)
         for frame in self._faults.flood(world.scene_ns, self.period_ns / SECOND_NS):
             self._port.send(frame)
