@@ -4,9 +4,12 @@ import pytest
 
 import planners
 from planners.dwa.planner import DynamicWindow
+from planners.graceful.planner import Graceful
 from planners.joint_waypoints.planner import JointWaypoints
+from planners.mppi.planner import Mppi
 from planners.orca.planner import ReciprocalAvoidance
 from planners.point_ds.planner import PointAttractor
+from planners.regulated_pure_pursuit.planner import RegulatedPurePursuit
 from planners.routers.grid import GridRouter
 from planners.shields.field_cbf import FieldCbf
 
@@ -15,6 +18,9 @@ from planners.shields.field_cbf import FieldCbf
     ("folder", "part"),
     [
         ("dwa", DynamicWindow),
+        ("graceful", Graceful),
+        ("mppi", Mppi),
+        ("regulated_pure_pursuit", RegulatedPurePursuit),
         ("point_ds", PointAttractor),
         ("joint_waypoints", JointWaypoints),
         ("orca", ReciprocalAvoidance),

@@ -1,0 +1,56 @@
+"""Settings of MPPI: Nav2's, with its defaults where the README does not say otherwise."""
+
+from pydantic import Field
+
+from drivers.interface.settings import Settings
+
+
+class MppiSettings(Settings):
+    """What is sampled, how it is averaged, and what the critics charge."""
+
+    batch_size: int = Field(1000, ge=10, le=20_000, description="trajectories that are sampled")
+    time_steps: int = Field(30, ge=10, le=200, description="of a trajectory")
+    model_dt_s: float = Field(0.1, ge=0.01, le=0.5, description="a time step")
+    iteration_count: int = Field(1, ge=1, le=10, description="of sampling and averaging, each about the last one's result")
+    vx_std_m_s: float = Field(0.2, gt=0.0, le=2.0, description="spread of the sampled velocities")
+    vy_std_m_s: float = Field(0.2, gt=0.0, le=2.0, description="the same sideways, for a base that can strafe")
+    wz_std_rad_s: float = Field(0.4, gt=0.0, le=5.0)
+    max_speed_m_s: float = Field(0.5, gt=0.0, le=5.0, description="vx_max, below the base's own cap; caps vy too")
+    max_reverse_m_s: float = Field(0.35, ge=0.0, le=5.0, description="-vx_min, for a base that may reverse")
+    max_turn_rad_s: float = Field(1.9, gt=0.0, le=10.0, description="wz_max, below the base's own cap")
+    temperature: float = Field(0.3, gt=0.0, le=100.0, description="0: the cheapest trajectory alone; large: the mean of all")
+    gamma: float = Field(0.015, ge=0.0, le=10.0, description="price of leaving the last control sequence, in the average")
+    regenerate_noises: bool = Field(False, description="draw new noise for every decision, not only after a reset")
+    retry_attempt_limit: int = Field(1, ge=0, le=10, description="resets within a decision after which it tries again")
+    validated_s: float = Field(2.0, ge=0.0, le=20.0, description="what is chosen must not collide within this; 0: not checked")
+    path_length_m: float = Field(1.7, gt=0.1, le=20.0, description="prune_distance: how much of the route ahead is followed")
+    path_spacing_m: float = Field(0.05, gt=0.0, le=0.5, description="between its points")
+    inflation_radius_m: float = Field(0.55, ge=0.0, le=5.0, description="places nearer to an obstacle than this cost")
+    inflation_scaling_per_m: float = Field(3.0, gt=0.0, le=100.0, description="cost_scaling_factor: how fast the cost falls")
+    margin_m: float = Field(0.05, ge=0.0, le=1.0, description="kept free beyond the robot's radius")
+    constraint_weight: float = Field(4.0, ge=0.0, le=1000.0, description="velocities beyond the caps")
+    cost_weight: float = Field(3.81, ge=0.0, le=1000.0, description="inflated cost along the trajectory")
+    collision_cost: float = Field(1e6, gt=0.0, le=1e9, description="cost of a trajectory that collides, in units of a cell's")
+    near_goal_m: float = Field(0.5, ge=0.0, le=10.0, description="this near the goal only collisions cost")
+    goal_weight: float = Field(5.0, ge=0.0, le=1000.0, description="mean distance to the goal,")
+    goal_threshold_m: float = Field(1.4, ge=0.0, le=20.0, description="nearer to it than this")
+    goal_angle_weight: float = Field(3.0, ge=0.0, le=1000.0, description="mean angle to the heading asked for at the goal,")
+    goal_angle_threshold_m: float = Field(0.5, ge=0.0, le=20.0, description="nearer to it than this")
+    path_align_weight: float = Field(10.0, ge=0.0, le=1000.0, description="mean distance to the path's point equally far along,")
+    path_align_threshold_m: float = Field(0.5, ge=0.0, le=20.0, description="with more of the path left than this,")
+    path_align_offset: int = Field(20, ge=0, le=1000, description="once a trajectory reaches this many points along it,")
+    path_align_step: int = Field(2, ge=1, le=20, description="at every so many time steps,")
+    path_occupancy_ratio: float = Field(0.07, ge=0.0, le=1.0, description="unless more of the path's points are blocked")
+    path_follow_weight: float = Field(5.0, ge=0.0, le=1000.0, description="distance of the end to a point of the path,")
+    path_follow_threshold_m: float = Field(1.4, ge=0.0, le=20.0, description="with more of the path left than this;")
+    path_follow_offset: int = Field(6, ge=0, le=1000, description="so many points beyond what any trajectory reaches")
+    path_angle_weight: float = Field(2.2, ge=0.0, le=1000.0, description="angle of the end to a point of the path,")
+    path_angle_threshold_m: float = Field(0.5, ge=0.0, le=20.0, description="farther from the goal than this;")
+    path_angle_offset: int = Field(4, ge=0, le=1000, description="so many points beyond what any trajectory reaches,")
+    path_angle_limit_rad: float = Field(0.785, ge=0.0, le=3.15, description="if it lies farther aside of the robot than this")
+    prefer_forward_weight: float = Field(5.0, ge=0.0, le=1000.0, description="way driven in reverse,")
+    prefer_forward_threshold_m: float = Field(0.5, ge=0.0, le=20.0, description="farther from the goal than this")
+    twirling_weight: float = Field(0.0, ge=0.0, le=1000.0, description="mean rate of turning, for a base that can strafe")
+    arrival_m: float = Field(0.05, gt=0.0, le=1.0, description="this near the route's end it stands, once it is turned as asked")
+    arrival_angle_rad: float = Field(0.1, gt=0.0, le=3.15, description="within this")
+    drawn: int = Field(10, ge=0, le=1000, description="cheapest trajectories that the viewer shows")
