@@ -123,13 +123,16 @@ class Configuration:
 
 
 def load(name_or_path: str, overrides: tuple[str, ...] = ()) -> Configuration:
-    """Load a configuration by path or shipped name, with `a.b=c` overrides on top.
+    """Load a configuration by path, shipped name or `NAME:FILE#WORLD`, with `a.b=c` overrides on top.
 
     Raises:
         ConfigurationError: with the file, the key and the valid choices.
     """
+    name_or_path, imported = yaml_files.parse_import(name_or_path)
     path = yaml_files.find(name_or_path, "scenarios")
     content = yaml_files.read(path, "scenarios")
+    for keys, value in imported:
+        content = yaml_files.override(content, keys, value)
     changes = [yaml_files.parse_override(text) for text in overrides]
     for keys, value in changes:
         if keys == ("robot",):  # a change of robot comes before changes to it

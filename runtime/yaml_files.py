@@ -99,6 +99,27 @@ def merge(base: Mapping, over: Mapping) -> Mapping:
     return result
 
 
+def parse_import(text: str) -> tuple[str, tuple[tuple[tuple[str, ...], str], ...]]:
+    """Split `NAME:FILE#WORLD`, a world of a file that others made, into the configuration's name and what it sets.
+
+    >>> parse_import("barn:worlds.json#30")
+    ('barn', ((('world', 'path'), 'worlds.json'), (('world', 'world'), '30')))
+    >>> parse_import("door")
+    ('door', ())
+
+    Raises:
+        ConfigurationError: the file is missing from it.
+    """
+    name, colon, address = text.partition(":")
+    if not colon or len(Path(name).parts) != 1:
+        return text, ()
+    file, mark, world = address.rpartition("#") if "#" in address else (address, "", "")
+    if not file or (mark and not world):
+        raise ConfigurationError(f"an imported world is written NAME:FILE or NAME:FILE#WORLD, not '{text}'")
+    path = (("world", "path"), file)
+    return name, (path, (("world", "world"), world)) if mark else (path,)
+
+
 def parse_override(text: str) -> tuple[tuple[str, ...], Any]:
     """Split `a.b=c` into the keys and the value (read as YAML).
 

@@ -8,10 +8,16 @@ from runtime.registry import Part, first_line, load, names
 from sim_drivers.scenario import Scenario
 from sim_drivers.scene import Scene
 from sim_drivers.world import MujocoWorld, WorldSettings
-from tests.contract.devices import SETTINGS
+from tests.contract.devices import DATA, SETTINGS
 from tests.contract.facts import facts
 
-WITHOUT_GOALS = {"arm_bench", "hidden_crossing"}  # their robots go nowhere
+WITHOUT_GOALS = {"arm_bench", "hidden_crossing", "gazebo"}  # their robots go nowhere, or where the mission says
+WORLD_FILES = {
+    "barn": {"path": DATA / "barn" / "barn_2_worlds.json", "world": 20},
+    "dynabarn": {"path": DATA / "dynabarn" / "dynabarn_2_worlds.json", "world": 18},
+    "gazebo": {"path": DATA / "gazebo" / "yard.world"},
+}
+NEEDED = {Part.DRIVER: SETTINGS, Part.SCENARIO: WORLD_FILES}
 REGISTERED = [pytest.param(part, name, id=f"{part.noun}-{name}") for part in Part for name in names(part)]
 
 
@@ -24,7 +30,7 @@ def test_says_what_it_is_in_one_line(part, name):
 
 @pytest.mark.parametrize(("part", "name"), REGISTERED)
 def test_settings_are_strict_frozen_and_survive_their_own_dump(part, name):
-    model, needed = load(part, name).Settings, SETTINGS.get(name, {}) if part is Part.DRIVER else {}
+    model, needed = load(part, name).Settings, NEEDED.get(part, {}).get(name, {})
     assert issubclass(model, Settings)
     settings = model(**needed)
     assert model.model_validate(settings.model_dump(mode="json")) == settings
@@ -46,15 +52,15 @@ def test_numbers_have_bounds_and_settings_have_a_schema(part, name):
 
 @pytest.mark.parametrize("name", names(Part.SCENARIO))
 def test_a_scenario_draws_a_scene_that_compiles(name):
-    cls = load(Part.SCENARIO, name)
-    scenario = cls(cls.Settings())
+    cls, needed = load(Part.SCENARIO, name), WORLD_FILES.get(name, {})
+    scenario = cls(cls.Settings(**needed))
     assert isinstance(scenario, Scenario)
     scene = scenario.draw(4)
     assert isinstance(scene, Scene)
     assert scene.name == name
     assert scene.goals or name in WITHOUT_GOALS
     assert scene.time_limit_s > 0.0
-    assert facts(cls(cls.Settings()).draw(4)) == facts(scene)
+    assert facts(cls(cls.Settings(**needed)).draw(4)) == facts(scene)
     MujocoWorld(scene, WorldSettings()).compile()
 
 
