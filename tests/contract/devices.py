@@ -52,7 +52,6 @@ SETTINGS: dict[str, dict[str, Any]] = {
         "path": DATA / "realsense_depth", "rate_hz": 30.0, "fx_px": 390.0, "fy_px": 390.0, "cx_px": 320.0, "cy_px": 240.0,
         "loop": True,
     },
-    "franka": {"host": "127.66.13.37"},  # on which nobody listens: refused at once, not after a time-out
     "recorded_wheels": {"path": DATA / "diff_drive" / "input_excerpt.txt"},
 }  # fmt: skip
 ROLE = {
@@ -135,7 +134,7 @@ class Bench:
         self.wait(0.02)
         start = self.read()[-1].position_rad
         knots = np.stack((start, start + value * np.eye(len(start))[0]))
-        return JointTrajectory(self.now_ns(), np.array([0.0, 2.0]), knots, np.zeros_like(knots))
+        return JointTrajectory(self.now_ns(), np.array([0.0, 1.0]), knots, np.zeros_like(knots))
 
     def command(self, order: BodyTwist | JointTrajectory, lifetime_s: float) -> None:
         self.device.command(order, self.now_ns() + round(lifetime_s * 1e9))

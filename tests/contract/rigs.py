@@ -9,11 +9,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
-from runtime.emulate import FreeRun
+from runtime.emulate import CATCH_UP_NS, FreeRun
 from runtime.registry import Part, load
 from sim_drivers.firmware.firmware import FirmwareSetup
 from sim_drivers.world import MujocoWorld
 from tests.faults.emulated import GROUP, free_port
+from tests.sim_drivers.firmware.fcibench import free_host
 
 
 @dataclass(frozen=True)
@@ -49,10 +50,15 @@ def realsense() -> Rig:
     return Rig({"source": "emulated", "memory": f"contract-{free_port()}"}, hasty={"connect_s": 0.3})
 
 
+def franka() -> Rig:
+    return Rig({"host": free_host(), "open_timeout_s": 20.0}, hasty={"open_timeout_s": 5.0})
+
+
 RIGS: dict[str, Callable[[], Rig]] = {  # by the driver's name
     "omni_can": omni_can,
     "rover_serial": rover_serial,
     "rover_imu": rover_imu,
+    "franka": franka,
     "emulated_truth": emulated_truth,
     "realsense": realsense,
     "realsense_imu": realsense,
@@ -69,6 +75,7 @@ class FreeRunning:
             driver_settings = load(Part.DRIVER, rig.served_by).Settings(**rig.driver)
         self._run = FreeRun(world)
         self._firmware = cls(driver_settings, cls.Settings(**rig.firmware), FirmwareSetup("tested", seed, world, self._run))
+        self._run.catch_up_ns = getattr(self._firmware, "catch_up_ns", CATCH_UP_NS)
         self._over = threading.Event()
 
     @contextmanager
