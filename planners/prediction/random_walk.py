@@ -1,0 +1,29 @@
+"""Nobody knows: everybody wanders from where he is, at a speed that says nothing of where to."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planners.prediction.memoryless import Memoryless
+from planners.prediction.predictor import Futures, Occasion
+
+
+class RandomWalkPredictor(Memoryless):
+    """A Brownian motion from each track's place; its spread grows with the root of the time."""
+
+    conjectures: tuple[str, ...] = ("random_walk",)
+
+    def __init__(self, diffusion_m_rt_s: float) -> None:
+        """Take the standard deviation after one second, each axis."""
+        super().__init__()
+        self._diffusion = diffusion_m_rt_s
+
+    def sample(self, occasion: Occasion, rng: np.random.Generator) -> Futures:
+        """Return walks."""
+        seen, count, steps_s = self._seen, occasion.scenarios, np.diff(occasion.times_s, prepend=0.0)
+        start = rng.standard_normal((len(seen), 2, count)) * np.sqrt(seen.spread[:, :1, None]) + seen.state[:, :2, None]
+        stride = rng.standard_normal((len(steps_s), len(seen), 2, count))
+        stride *= self._diffusion * np.sqrt(steps_s)[:, None, None, None]
+        return Futures(
+            (start + np.cumsum(stride, axis=0)).astype(np.float32), seen.radius_m, np.zeros((len(seen), count), np.int64)
+        )

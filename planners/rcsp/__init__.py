@@ -1,0 +1,1 @@
+"""Risk-sensitive conjectural scenario planning."""

@@ -1,0 +1,138 @@
+"""One decision's numbers: reward, tail risk and objective of every command."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.belief import F32, F64
+from planners.planner import Diagnostics
+from planners.prediction.conjectures import ConjectureFamily
+from planners.prediction.predictor import Futures, Occasion, Predictor
+from planners.rcsp.kernels import (
+    INVERSE_CLEARANCE,
+    NEAR_MISS,
+    VIOLATION,
+    Risk,
+    clearances,
+    largest,
+    mean_risk,
+    reacting_clearances,
+    tails,
+)
+from planners.rcsp.settings import RcspSettings, RiskSettings
+from planners.risk import objective_error, tail_count
+from planners.velocity_lattice import Rollouts
+
+KINDS = {"inverse_clearance": INVERSE_CLEARANCE, "violation": VIOLATION, "near_miss": NEAR_MISS}
+REWARD_RANGE = 2.0  # B_R: rewards are cut to [-1, 1]
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """What came of the scenarios, for every command."""
+
+    objective: F64  # (commands,), J
+    reward: F64  # (commands,), R
+    risk: F64  # (commands,), the risk measure of G
+    room_m: F64  # (commands,), mean clearance of the tail, up to where there is no risk
+    free: NDArray[np.bool_]  # (commands,), whether fewer scenarios than make a tail touch anything
+    clearance: F32  # (commands, scenarios), tail first
+    futures: Futures
+    tail: int  # scenarios in it
+
+    def best(self) -> tuple[int, bool]:
+        """Return the command to ask for, and whether it is free: the best by objective, else, where none is, the least risky.
+
+        Of equally risky ones, the better by reward is not the safer: the objective does not decide between collisions.
+        """
+        if self.free.any():
+            return int(np.argmax(np.where(self.free, self.objective, -np.inf))), True
+        return int(np.argmin(self.risk)), False
+
+
+class Evaluator:
+    """Holds rollouts against sampled futures."""
+
+    def __init__(self, settings: RcspSettings, predictor: Predictor, robot_radius_m: float, commands: int) -> None:
+        """Take settings and predictor."""
+        self._settings, self._predictor, self._radius_m, self._commands = settings, predictor, robot_radius_m, commands
+        r = settings.risk
+        self._risk = Risk(KINDS[r.kind], r.safe_m, r.collision, r.depth_m)
+        self._bound = max(largest(self._risk, r.safe_m), largest(self._risk, r.static_safe_m))
+
+    def evaluate(self, rolled: Rollouts, reward: F64, nominal: int, scenarios: int, rng: np.random.Generator) -> Evaluation:
+        """Return the evaluation of all commands in `scenarios` futures, the same for every command.
+
+        Args:
+            rolled: where each command leads.
+            reward: shape (commands,).
+            nominal: the command that stands for the motion of the robot that obstacles react to.
+            scenarios: N.
+            rng: what futures are drawn from.
+        """
+        s = self._settings
+        times_s: F64 = np.asarray(s.lattice.latency_s + s.step_s * np.arange(1, s.steps + 1), np.float64)
+        robot = np.stack((rolled.x[nominal], rolled.y[nominal]), axis=1).astype(np.float64)
+        futures, clearance = self._held_against(rolled, times_s, robot, scenarios, rng)
+        tail = tail_of(s.risk, scenarios)
+        risk, room_m, free = tails(clearance, rolled.static_m, rolled.brakable, tail, self._risk, s.risk.static_safe_m)
+        return Evaluation(reward - s.risk.weight * risk, reward, risk, room_m, free, clearance, futures, tail)
+
+    def _held_against(
+        self, rolled: Rollouts, times_s: F64, robot: F64, scenarios: int, rng: np.random.Generator
+    ) -> tuple[Futures, F32]:
+        far_m, predictor = self._settings.risk.safe_m, self._predictor
+        occasion = Occasion(times_s, robot, scenarios)
+        if self._settings.reaction == "candidate" and isinstance(predictor, ConjectureFamily):
+            futures, draws = predictor.sample_with_draws(occasion, rng)
+            return futures, reacting_clearances(rolled.x, rolled.y, draws, np.diff(times_s, prepend=0.0), far_m)
+        futures = predictor.sample(occasion, rng)
+        contact = (futures.radius_m + self._radius_m).astype(np.float32)
+        return futures, clearances(rolled.x, rolled.y, futures.position_in_odom, contact, far_m)
+
+    def mean_risk(self, told: Evaluation, rolled: Rollouts, command: int) -> float:
+        """Return the mean over the scenarios of a command's risk."""
+        s = self._settings.risk
+        static_m, brakable = float(rolled.static_m[command]), bool(rolled.brakable[command])
+        return float(mean_risk(told.clearance[command], static_m, brakable, self._risk, s.static_safe_m))
+
+    def bound(self, scenarios: int) -> float:
+        """Return epsilon_N(delta) of proposition C.3."""
+        s = self._settings.risk
+        share = tail_of(s, scenarios) / scenarios
+        return objective_error(scenarios, share, self._bound, REWARD_RANGE, s.weight, self._commands, s.delta)
+
+
+def tail_of(settings: RiskSettings, scenarios: int) -> int:
+    """Return how many scenarios count: all for the mean, one for the worst, else the tail."""
+    if settings.measure == "cvar":
+        return tail_count(scenarios, settings.tail_fraction)
+    return scenarios if settings.measure == "mean" else 1
+
+
+@dataclass(frozen=True, slots=True)
+class RcspDiagnostics(Diagnostics):
+    """How a decision came about."""
+
+    stopped: str = ""  # why it asks to stand
+    warning: str = ""  # what was wrong with what it was given
+    scenarios: int = 0  # N
+    budget_ms: float = 0.0  # time it was given; 0: no limit
+    bound: float = 0.0  # epsilon_N(delta) of proposition C.3
+    objective: float = 0.0  # J of the chosen command
+    progress: float = 0.0  # R
+    cvar: float = 0.0  # the risk measure
+    mean_risk: float = 0.0
+    tail_room_m: float = 0.0  # mean clearance of its tail
+    free: int = 0  # commands whose tail touches nothing
+    obstacles: int = 0
+    commitment_s: float = -1.0  # until the fastest way on meets its tail, less what braking takes; negative: it does not
+    weight_static: float = 0.0
+    weight_slow: float = 0.0
+    weight_constant: float = 0.0
+    weight_fast: float = 0.0
+    weight_yielding: float = 0.0
+    weight_aggressive: float = 0.0

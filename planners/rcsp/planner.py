@@ -1,0 +1,209 @@
+"""Risk-sensitive conjectural scenario planning: velocity commands by the tail of what obstacles may plausibly do.
+
+Source: Han, Zhu, RCSP: Risk-Sensitive Conjectural Scenario Planning for Safe Dynamic Robot Navigation.  README.md beside this
+file says what differs and why.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+import numpy as np
+
+from drivers.interface.commands import BodyTwist
+from drivers.interface.errors import ConfigurationError
+from drivers.interface.seeds import stream
+from drivers.interface.stateful import pack, unpack
+from estimators.belief import F64, Belief
+from planners.planner import Plan, PlannerSetup
+from planners.polyline import arc_length
+from planners.prediction.conjectures import ConjectureFamily
+from planners.prediction.constant_velocity import ConstantVelocityPredictor
+from planners.prediction.predictor import Predictor
+from planners.prediction.random_walk import RandomWalkPredictor
+from planners.rcsp.budget import affordable
+from planners.rcsp.drawing import commitment_step, drawn
+from planners.rcsp.evaluation import Evaluation, Evaluator, RcspDiagnostics
+from planners.rcsp.kernels import to_go
+from planners.rcsp.rehearsal import rehearse
+from planners.rcsp.settings import RcspSettings
+from planners.router import Route
+from planners.static_field import static_clearance
+from planners.velocity_lattice import Drive, Ground, Rollouts, VelocityLattice, after_latency, roll_out
+
+_SPACING = 3  # points of the route between two that progress is measured along
+_ROUTE_SPARE_M = 1.0  # how much farther along than a rollout reaches
+
+
+class Rcsp:
+    """RCSP: of a lattice of velocities, the best by progress less the CVaR of risk over sampled futures of the obstacles."""
+
+    Settings = RcspSettings
+    default_shield: ClassVar[str] = "lattice"
+
+    def __init__(self, settings: RcspSettings, setup: PlannerSetup) -> None:
+        """Set everything up.
+
+        Raises:
+            ConfigurationError: there is no base.
+        """
+        if setup.limits is None:
+            raise ConfigurationError("planner.name 'rcsp' drives a base, but the robot has none")
+        self._settings, self._setup = settings, setup
+        self._lattice = VelocityLattice.of(settings.lattice, setup.limits)
+        self._drive = Drive.of(settings.lattice, setup.limits)
+        self._predictor = _predictor(settings, setup.robot_radius_m)
+        self._evaluator = Evaluator(settings, self._predictor, setup.robot_radius_m, len(self._lattice))
+        self._standing = self._lattice.index_of_rest
+        self._last = self._standing  # the command asked for last
+
+    def warm_up(self) -> None:
+        """Compile every kernel, on a scene of its own."""
+        for reaction in ("nominal", self._settings.reaction):
+            rehearse(type(self)(self._settings.model_copy(update={"reaction": reaction}), self._setup))
+
+    def plan(self, belief: Belief, route: Route) -> Plan:
+        """Return the command with the best objective over all the scenarios of the settings."""
+        return self._planned(belief, route, None)
+
+    def plan_within(self, belief: Belief, route: Route, budget_ns: int) -> Plan:
+        """Return the same over as many scenarios as there is time for."""
+        return self._planned(belief, route, budget_ns)
+
+    def _planned(self, belief: Belief, route: Route, budget_ns: int | None) -> Plan:
+        self._predictor.observe(belief)
+        obstacles, distances = len(self._predictor.seen), len(self._lattice) * self._settings.steps
+        reacting = self._settings.reaction == "candidate"
+        scenarios = affordable(self._settings.budget, budget_ns, distances * obstacles, reacting=reacting)
+        reason = self._refusal(belief, route) or ("there is no time for any scenario" if scenarios == 0 else "")
+        if reason:
+            self._last = self._standing
+            said = RcspDiagnostics(stopped=reason, budget_ms=(budget_ns or 0) / 1e6, obstacles=obstacles)
+            return Plan(BodyTwist(), diagnostics=said)
+        rolled = self._rolled_out(belief)
+        reward = self._reward(belief, route, rolled)
+        rng = stream(self._setup.seed, "rcsp", belief.tick)
+        told = self._evaluator.evaluate(rolled, reward, self._last, scenarios, rng)
+        self._last, free = told.best()
+        return self._plan(belief, rolled, told, free, budget_ns)
+
+    def _refusal(self, belief: Belief, route: Route) -> str:
+        """Return why there is nothing to do, or nothing."""
+        pose = belief.odom_from_base
+        if route.empty:
+            return "the way is blocked" if route.blocked else "no goal"
+        if not (belief.twist.finite and math.isfinite(pose.x) and math.isfinite(pose.y) and math.isfinite(pose.yaw)):
+            return "the pose or the twist is not finite"
+        if math.hypot(*(route.path_in_odom[-1] - (pose.x, pose.y))) < self._settings.arrival_m:
+            return "arrived"
+        return ""
+
+    def _rolled_out(self, belief: Belief) -> Rollouts:
+        """Return where each command leads from when it takes hold, in the field of what stands still."""
+        s, pose, lattice = self._settings, belief.odom_from_base, belief.grid.lattice
+        last = self._lattice.twist(self._last)
+        start, now = after_latency(
+            np.array([pose.x, pose.y, pose.yaw]), np.array([belief.twist.vx, belief.twist.wz]),
+            np.array([last.vx, last.wz]), self._drive,
+        )  # fmt: skip
+        around = Ground(
+            static_clearance(belief, s.track_margin_m), belief.grid.label, lattice.x_m, lattice.y_m, lattice.cell_m,
+            self._setup.robot_radius_m, s.hold_m, s.body_m if s.stop_before_unknown else -1.0,
+        )  # fmt: skip
+        speeds, turns = self._lattice.speed_m_s, self._lattice.turn_rad_s
+        rolled: Rollouts = roll_out(start, now, speeds, turns, self._drive, s.step_s, s.steps, around)
+        return rolled
+
+    def _reward(self, belief: Belief, route: Route, rolled: Rollouts) -> F64:
+        """Return R of every command, shape (commands,): progress along the route over what full speed makes, less change."""
+        s, r = self._settings, self._settings.reward
+        reach_m = self._lattice.speed_m_s[-1] * s.step_s * s.steps
+        path = _ahead(route.path_in_odom, reach_m + _ROUTE_SPARE_M)
+        pose = belief.odom_from_base
+        x, y, yaw = (
+            np.append(part[:, -1], np.float32(here)) for part, here in zip(rolled[:3], (pose.x, pose.y, pose.yaw), strict=True)
+        )
+        left = to_go(x, y, yaw, path, arc_length(path), r.lateral, r.heading_m_per_rad, r.look_ahead_m)
+        progress = (left[-1] - left[:-1]) / reach_m
+        return np.asarray(np.clip(progress - r.change * self._lattice.change_from(self._last), -1.0, 1.0))
+
+    def _plan(self, belief: Belief, rolled: Rollouts, told: Evaluation, free: bool, budget_ns: int | None) -> Plan:
+        chosen = self._last
+        position = told.futures.position_in_odom
+        contact = (told.futures.radius_m + self._setup.robot_radius_m).astype(np.float32)
+        keenest = int(np.argmax(told.reward))
+        commitment = commitment_step(rolled, keenest, position, contact, told.tail)
+        brake_s = max(0.0, belief.twist.vx) / self._drive.acceleration
+        said = RcspDiagnostics(
+            stopped="" if free else "every candidate is infeasible",
+            warning=self._warning(belief),
+            scenarios=position.shape[3],
+            budget_ms=(budget_ns or 0) / 1e6,
+            bound=self._evaluator.bound(position.shape[3]),
+            objective=float(told.objective[chosen]),
+            progress=float(told.reward[chosen]),
+            cvar=float(told.risk[chosen]),
+            mean_risk=self._evaluator.mean_risk(told, rolled, chosen),
+            tail_room_m=float(told.room_m[chosen]),
+            free=int(told.free.sum()),
+            obstacles=position.shape[1],
+            commitment_s=max(0.0, (commitment + 1) * self._settings.step_s - brake_s) if commitment >= 0 else -1.0,
+            **{
+                f"weight_{n}": float(w)
+                for n, w in zip(self._predictor.conjectures, self._predictor.weights, strict=True)
+                if n != "random_walk"
+            },
+        )
+        path = np.stack((rolled.x[chosen], rolled.y[chosen]), axis=1).astype(np.float64)
+        twist = self._lattice.twist(chosen)
+        latency_ns = round(self._settings.lattice.latency_s * 1e9)
+        return Plan(
+            twist,
+            path_in_odom=path,
+            diagnostics=said,
+            latency_ns=latency_ns,
+            drawings=drawn(rolled, told, self._predictor.conjectures, keenest, commitment),
+        )
+
+    def _warning(self, belief: Belief) -> str:
+        """Return what is wrong with the tracks, or nothing."""
+        seen, pose = self._predictor.seen, belief.odom_from_base
+        if seen.left_out:
+            return f"{seen.left_out} tracks are not finite and were left out"
+        if len(seen) == 0:
+            return ""
+        gap_m = np.hypot(*(seen.state[:, :2] - (pose.x, pose.y)).T) - seen.radius_m - self._setup.robot_radius_m
+        if gap_m.min() < 0.0:
+            return "an obstacle lies on the robot"
+        if seen.spread[:, 0].max() > self._settings.prediction.sigma_cap_m**2:
+            return "a track is too uncertain to say where its obstacle is"
+        return ""
+
+    def snapshot(self) -> bytes:
+        """Return the whole state."""
+        return pack(last=self._last, predictor=np.frombuffer(self._predictor.snapshot(), np.uint8))
+
+    def restore(self, snapshot: bytes) -> None:
+        """Take over a state."""
+        state = unpack(snapshot)
+        self._last = int(state["last"])
+        self._predictor.restore(state["predictor"].tobytes())
+
+
+def _predictor(settings: RcspSettings, robot_radius_m: float) -> Predictor:
+    if settings.predictor == "conjectures":
+        return ConjectureFamily(settings.prediction, robot_radius_m)
+    return (
+        ConstantVelocityPredictor()
+        if settings.predictor == "constant_velocity"
+        else RandomWalkPredictor(settings.diffusion_m_rt_s)
+    )
+
+
+def _ahead(path: F64, length_m: float) -> F64:
+    """Return the beginning of a route, thinned, its end kept, shape (n, 2) with n >= 2."""
+    along = arc_length(path)
+    beginning = path[: max(2, int(np.searchsorted(along, length_m)) + 1)]
+    thinned = beginning[:-1:_SPACING]
+    return np.ascontiguousarray(np.concatenate((thinned, beginning[-1:])) if len(path) > 1 else np.repeat(path, 2, axis=0))

@@ -1,0 +1,139 @@
+"""The fixed safety filter over a finite lattice: CBF-style, discrete, over any planner.
+
+Source: Han, Zhu, RCSP, section 4.4.  README.md beside this file says what differs and why.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from drivers.interface.commands import BodyTwist, Command
+from drivers.interface.samples import frozen_array
+from drivers.interface.settings import Settings
+from estimators.belief import Belief
+from planners import static_field
+from planners.planner import Diagnostics, Drawing
+from planners.shield import Filtered, ReachableSet, ShieldSetup
+from planners.shields.lattice_kernels import Local, forecast
+from planners.static_field import static_clearance
+from planners.velocity_lattice import LatticeSettings, VelocityLattice
+
+F64 = NDArray[np.float64]
+
+_NOMINAL_SHARES = (1.0, 0.75, 0.5, 0.25, 0.0)  # of the asked twist: on a base that can strafe the lattice holds none of them
+_TIE = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class LatticeShieldDiagnostics(Diagnostics):
+    """How the command was filtered."""
+
+    feasible: int  # of the candidates
+    asked_feasible: bool
+    clearance_m: float  # now, up to `far_m`
+    least_clearance_m: float  # on the rollout of what is sent
+    enclosed: bool = False  # an obstacle lies on the robot
+    infeasible: bool = False  # no candidate is feasible: the one that keeps most clearance is sent
+
+
+class LatticeShield:
+    """Lattice filter: what was asked where a short rollout of it keeps clear, else the best candidate of a velocity lattice."""
+
+    class Settings(Settings):
+        """Section 4.4; the paper gives no numbers."""
+
+        horizon_s: float = Field(default=1.2, gt=0.0, le=10.0, description="of the rollout")
+        steps: int = Field(default=12, ge=2, le=100)
+        hard_m: float = Field(default=0.05, ge=0.0, le=1.0, description="c_hard")
+        gain: float = Field(default=0.9, gt=0.0, le=1.0, description="kappa: share of the margin that a rollout may take")
+        far_m: float = Field(default=1.0, gt=0.0, le=10.0, description="clearance beyond which more is worth nothing")
+        track_margin_m: float = Field(default=0.10, ge=0.0, le=1.0, description="occupied cells this near to a track are its own")
+        weight_progress: float = Field(default=1.0, ge=0.0, le=100.0, description="per metre towards where the asked twist leads")
+        weight_clearance: float = Field(default=0.5, ge=0.0, le=100.0, description="per metre")
+        weight_closeness: float = Field(default=0.5, ge=0.0, le=100.0, description="per share of the caps that separates the two")
+        lattice: LatticeSettings = LatticeSettings()
+
+    def __init__(self, settings: Settings, setup: ShieldSetup) -> None:
+        """Lay the lattice."""
+        self._settings, self._radius_m = settings, setup.robot_radius_m
+        self._twists, self._caps, self._acceleration = np.zeros((0, 3)), np.ones(3), np.ones(3)
+        if setup.limits is not None:
+            lattice, limits = VelocityLattice.of(settings.lattice, setup.limits), setup.limits
+            speeds, turns = np.meshgrid(lattice.speed_m_s, lattice.turn_rad_s, indexing="ij")
+            self._twists = np.stack((speeds.ravel(), np.zeros(len(lattice)), turns.ravel()), axis=1)
+            self._caps = np.array([limits.velocity.vx, max(limits.velocity.vy, 1.0), limits.velocity.wz])
+            self._acceleration = np.array([limits.acceleration.vx, limits.acceleration.vy, limits.acceleration.wz])
+
+    def warm_up(self) -> None:
+        """Compile the kernels; a belief's arrays are read-only, which is a type of its own."""
+        label = frozen_array(np.zeros((3, 3), np.uint8))
+        static_field.warm_up(label)
+        for field in (np.ones((3, 3), np.float32), frozen_array(np.ones((3, 3), np.float32))):
+            local = Local(field, 0.0, 0.0, 1.0, np.zeros((1, 5)), 0.1, 1.0)
+            forecast(np.zeros(3), np.zeros(3), np.zeros((1, 3)), np.ones(3), 0.1, 0.1, 0.1, 2, local)
+
+    def filter(self, command: Command, belief: Belief, reachable: ReachableSet) -> Filtered:
+        """Return the command with its twist filtered into `reachable`; one that is not finite counts as a stop."""
+        if command.base is None:
+            return Filtered(command)
+        asked = reachable.clip(command.base if command.base.finite else BodyTwist())
+        twists = self._candidates(asked)
+        least, end, here = self._forecast(belief, twists)
+        feasible = self._feasible(least, here)
+        chosen = self._choose(twists, least, end - (belief.odom_from_base.x, belief.odom_from_base.y), feasible)
+        twist = reachable.clip(BodyTwist(*twists[chosen].tolist()))
+        said = LatticeShieldDiagnostics(
+            int(feasible.sum()), bool(feasible[0]), here, float(least[chosen]), here < 0.0, not bool(feasible.any())
+        )
+        drawings = (Drawing("asked", end[:1], connected=False), Drawing("sent", end[[chosen]], connected=False))
+        return Filtered(replace(command, base=twist), twist != command.base, said, drawings)
+
+    def snapshot(self) -> bytes:
+        """Return nothing: it has no state."""
+        return b""
+
+    def restore(self, snapshot: bytes) -> None:
+        """Nothing to take over."""
+
+    def _candidates(self, asked: BodyTwist) -> F64:
+        """Return A_t, shape (n, 3), the asked twist first."""
+        own = np.array([_NOMINAL_SHARES]).T * (asked.vx, asked.vy, asked.wz)
+        return np.concatenate((own, self._twists))
+
+    def _forecast(self, belief: Belief, twists: F64) -> tuple[F64, F64, float]:
+        s, pose, now, lattice = self._settings, belief.odom_from_base, belief.twist, belief.clearance.lattice
+        movers = [(*track.position_in_odom, *track.velocity_in_odom, track.radius_m + self._radius_m) for track in belief.tracks]
+        known = np.array(movers).reshape(-1, 5)
+        known = known[np.isfinite(known).all(axis=1)]
+        field = static_clearance(belief, s.track_margin_m)
+        local = Local(field, lattice.x_m, lattice.y_m, lattice.cell_m, known, self._radius_m, s.far_m)
+        told: tuple[F64, F64, float] = forecast(
+            np.array([pose.x, pose.y, pose.yaw]), np.array([now.vx, now.vy, now.wz]), twists, self._acceleration,
+            s.lattice.latency_s, s.lattice.response_s, s.horizon_s / s.steps, s.steps, local,
+        )  # fmt: skip
+        return told
+
+    def _feasible(self, least_m: F64, here_m: float) -> NDArray[np.bool_]:
+        """Return which rollouts keep c_hard, and of the margin that is there now at least the share 1 - kappa."""
+        hard_m, gain = self._settings.hard_m, self._settings.gain
+        keeps = (least_m - here_m) + gain * (here_m - hard_m) >= 0.0 if here_m > hard_m else np.ones(len(least_m), np.bool_)
+        return np.asarray((least_m >= hard_m) & keeps)
+
+    def _choose(self, twists: F64, least_m: F64, moved: F64, feasible: NDArray[np.bool_]) -> int:
+        """Return the candidate to send: the asked one where it is feasible, else the best that is, else the least bad."""
+        if feasible[0]:
+            return 0
+        s = self._settings
+        away = np.abs((twists - twists[0]) / self._caps).sum(axis=1)
+        if not feasible.any():
+            speed = np.abs(twists / self._caps).sum(axis=1)  # of those that keep as much, the slowest
+            return int(np.lexsort((speed, -np.round(least_m / _TIE) * _TIE))[0])
+        length_m = math.hypot(*moved[0])
+        towards = moved[0] / length_m if length_m > _TIE else np.zeros(2)
+        worth = s.weight_progress * (moved @ towards) + s.weight_clearance * least_m - s.weight_closeness * away
+        return int(np.argmax(np.where(feasible, worth, -np.inf)))
