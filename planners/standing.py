@@ -136,7 +136,8 @@ def boundary_points(world: StandingWorld, path: F64, reach_m: float, spacing_m: 
     No two are nearer to each other than `spacing_m`; there are at most `most`.
     """
     lattice = world.lattice
-    centres, apart = _near_cells(world.occupied, lattice.x_m, lattice.y_m, lattice.cell_m, path, reach_m)
+    corner = lattice.x_m, lattice.y_m, lattice.cell_m
+    centres, apart = _near_cells(world.occupied, *corner, np.ascontiguousarray(path), reach_m)
     points: F64 = _thin_out(centres, apart, spacing_m, most)
     return points
 

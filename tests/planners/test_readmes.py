@@ -7,6 +7,7 @@ from planners.dwa.planner import DynamicWindow
 from planners.graceful.planner import Graceful
 from planners.joint_waypoints.planner import JointWaypoints
 from planners.mppi.planner import Mppi
+from planners.mpc_cbf.planner import BarrierMpc
 from planners.orca.planner import ReciprocalAvoidance
 from planners.point_ds.planner import PointAttractor
 from planners.regulated_pure_pursuit.planner import RegulatedPurePursuit
@@ -23,6 +24,7 @@ from planners.shields.field_cbf import FieldCbf
         ("regulated_pure_pursuit", RegulatedPurePursuit),
         ("point_ds", PointAttractor),
         ("joint_waypoints", JointWaypoints),
+        ("mpc_cbf", BarrierMpc),
         ("orca", ReciprocalAvoidance),
         ("routers", GridRouter),
         ("shields", FieldCbf),

@@ -1,0 +1,1 @@
+"""Model predictive control with discrete-time control barrier functions."""
