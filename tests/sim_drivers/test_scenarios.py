@@ -192,11 +192,11 @@ def test_a_door_opens_and_closes_in_turn() -> None:
         def blocked(t: float, leaf=leaf, doorway=doorway) -> np.ndarray:
             return gap(leaf.shape, leaf.pose_at(t), doorway) < 0.1
 
-        states = np.array([blocked(t).mean() for t in np.arange(0.0, settings.period_s, 0.05)])
+        states = np.array([blocked(t).mean() for t in np.arange(0.0, settings.leaf.period_s, 0.05)])
         for state, rest_s in ((0.0, settings.open_s), (1.0, settings.closed_s)):
-            lasts_s = np.mean(states == state) * settings.period_s
+            lasts_s = np.mean(states == state) * settings.leaf.period_s
             assert rest_s - 0.1 <= lasts_s < rest_s + settings.move_s
-        assert np.array_equal(blocked(3.0), blocked(3.0 + settings.period_s))
+        assert np.array_equal(blocked(3.0), blocked(3.0 + settings.leaf.period_s))
 
 
 def test_the_worse_channel_is_the_one_asked_for() -> None:
