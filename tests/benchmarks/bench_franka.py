@@ -47,6 +47,7 @@ class _Watched:
 def _exchange() -> list[Figure]:
     told = (
         "robot=franka_emulated", f"robot.arm.host={free_host()}", f"robot.truth.port={free_port()}",
+        f"robot.camera.memory=bench-{free_port()}",
         f"planner.rounds={ROUNDS}", "mission.time_limit_s=60", "robot.truth.open_timeout_s=30",
     )  # fmt: skip
     words = [word for change in (*told, "loop.system.priority=50") for word in ("--set", change)]

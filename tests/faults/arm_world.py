@@ -16,7 +16,8 @@ from sim_drivers.firmware.fci_controller import FciController
 
 def main(host: str, port: str, memory: Path) -> None:
     told = (
-        "robot=franka_emulated", f"robot.arm.host={host}", f"robot.truth.port={port}", "loop.system.priority=50",
+        "robot=franka_emulated", "robot.camera=null", f"robot.arm.host={host}", f"robot.truth.port={port}",
+        "loop.system.priority=50",
     )  # fmt: skip
     settings = configuration.load("arm_waypoints", told)
     emulation = build(settings, seed=0)
