@@ -25,15 +25,16 @@ def segment_cost(cost: F64, x0: float, y0: float, x1: float, y1: float) -> float
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def pull_straight(path: F64, cost: F64) -> F64:
-    """Return the path, shape (n, 2) as x, y in cells, with every detour replaced by a segment that costs no more, shape (m, 2).
+    """Return the path from cell to cell, (n, 2) as x, y, with every detour replaced by a segment that costs no more, (m, 2).
 
     Greedy from the start, the farthest segment first, as the path smoothing of A* (Thorpe, 1984; Daniel et al., Theta*,
     JAIR 2010), but comparing cost instead of mere visibility, so that the clearance the search paid for is kept.
     """
     n = len(path)
     along = np.zeros(n)
-    for i in range(1, n):
-        along[i] = along[i - 1] + segment_cost(cost, path[i - 1, 0], path[i - 1, 1], path[i, 0], path[i, 1])
+    for i in range(1, n):  # from cell to cell, as the search counts it: halfway on a diagonal lies a cell that may be blocked
+        joined = cost[int(path[i - 1, 1]), int(path[i - 1, 0])] + cost[int(path[i, 1]), int(path[i, 0])]
+        along[i] = along[i - 1] + 0.5 * joined * np.hypot(path[i, 0] - path[i - 1, 0], path[i, 1] - path[i - 1, 1])
     kept = np.zeros(n, dtype=np.int64)
     count, here = 1, 0
     while here < n - 1:

@@ -102,6 +102,19 @@ def test_pulling_straight_never_costs_more_and_keeps_the_ends():
     assert np.isfinite(distance).all()
 
 
+@pytest.mark.parametrize("falling", [False, True])
+def test_a_path_that_touches_blocked_corners_is_not_pulled_through_what_is_blocked(falling):
+    cost = np.full((12, 12), np.inf)
+    cells = [(k, k) for k in range(9)] + [(8, y) for y in range(7, 0, -1)]  # along a diagonal gap, and back beside it
+    path = np.array([(x, 11 - y if falling else y) for x, y in cells], dtype=float)
+    cost[path[:, 1].astype(int), path[:, 0].astype(int)] = 1.0
+    pulled = pull_straight(path, cost)
+    corner = path[8].tolist()
+    assert pulled[0].tolist() == path[0].tolist()
+    assert pulled[-1].tolist() == path[-1].tolist()
+    assert corner in pulled.tolist()
+
+
 def test_open_space_is_crossed_in_a_straight_line():
     route = router_of().route(belief_of([]), mission_to(2.0, 0.7))
     assert route.path_in_odom[0] == pytest.approx([0.0, 0.0])
