@@ -59,6 +59,7 @@ class Plan:
     latency_ns: int = 0  # how long after the belief the command is meant to take effect
     drawings: tuple[Drawing, ...] = ()
     accomplished: bool | None = None  # of a mission that the planner itself holds; None: it holds none
+    budget_ns: int = 0  # how long the planner had for it; the runtime fills it in, as replay needs what an `Anytime` was told
 
 
 @runtime_checkable
@@ -76,4 +77,13 @@ class Planner(Stateful, Protocol):
 
     def plan(self, belief: Belief, route: Route) -> Plan:
         """Return what to do now.  An empty route means: stand still."""
+        ...
+
+
+@runtime_checkable
+class Anytime(Protocol):
+    """A planner whose effort follows the time there is; it is asked this way, and `plan` is without a limit."""
+
+    def plan_within(self, belief: Belief, route: Route, budget_ns: int) -> Plan:
+        """Return what to do now, in `budget_ns` at most; the same arguments give the same plan, however fast the machine is."""
         ...

@@ -12,6 +12,7 @@ from drivers.interface.errors import ConfigurationError
 from drivers.interface.geometry import SE2
 from drivers.interface.links import Links
 from drivers.interface.mission import Goal, Mission
+from runtime.budget import Budget, measured, modelled
 from runtime.configuration import Configuration
 from runtime.mission import MissionTracker
 from runtime.pacer import Pacer
@@ -91,11 +92,13 @@ def assemble(configuration: Configuration, seed: int) -> Assembly:
         robot=Robot(devices, mission),
         mission=mission,
         time_limit_s=_time_limit(configuration, scene),
-        parts=build_parts(configuration, seed, devices, mission.mission.map_from_start, ready),
+        parts=build_parts(
+            configuration, seed, devices, mission.mission.map_from_start, ready, _budget(configuration, clock, lockstep)
+        ),
     )
 
 
-def assemble_recorded(configuration: Configuration, seed: int, ready: Ready) -> Parts:
+def assemble_recorded(configuration: Configuration, seed: int, ready: Ready, budget: Budget) -> Parts:
     """Build the parts that decide for a robot whose devices are only asked what they are: no world, no clock, nothing opened.
 
     Raises:
@@ -103,7 +106,7 @@ def assemble_recorded(configuration: Configuration, seed: int, ready: Ready) -> 
     """
     scene = draw_scene(configuration, seed)
     devices = _devices(configuration, seed, _world(configuration, scene), lambda: 0)
-    return build_parts(configuration, seed, devices, _mission(configuration, scene).map_from_start, ready)
+    return build_parts(configuration, seed, devices, _mission(configuration, scene).map_from_start, ready, budget)
 
 
 def draw_scene(configuration: Configuration, seed: int) -> Scene | None:
@@ -147,6 +150,13 @@ def _clock(configuration: Configuration, world: MujocoWorld | None) -> tuple[Clo
     world.compile()
     _check_period(configuration, world)
     return (PacedClock(world, world.step_ns) if realtime else SimClock(world)), not realtime
+
+
+def _budget(configuration: Configuration, clock: Clock, lockstep: bool) -> Budget:
+    loop = configuration.loop
+    if lockstep:
+        return modelled(loop.period_ns, round(loop.work_ms * 1e6), round(loop.plan_ms * 1e6))
+    return measured(clock.now_ns, loop.period_ns)
 
 
 def _check_period(configuration: Configuration, world: MujocoWorld) -> None:

@@ -13,6 +13,7 @@ from estimators.estimator import Estimator, EstimatorSetup
 from planners.planner import Planner, PlannerSetup
 from planners.router import Router, RouterSetup
 from planners.shield import Shield, ShieldSetup
+from runtime.budget import Budget, fixed, within
 from runtime.configuration import Configuration
 from runtime.cycle import Cycle
 from runtime.fault_board import FaultBoard
@@ -57,8 +58,12 @@ class Parts:
         )
 
 
-def build_parts(configuration: Configuration, seed: int, devices: Devices, map_from_start: SE2, ready: Ready) -> Parts:
+def build_parts(
+    configuration: Configuration, seed: int, devices: Devices, map_from_start: SE2, ready: Ready, budget: Budget
+) -> Parts:
     """Build every part for a robot of these devices, of which only what they say of themselves is read.
+
+    `budget` is of a planner that is called within the tick; one in the background has its latency.
 
     Raises:
         ConfigurationError: parts that do not fit together; the sentence says which.
@@ -76,6 +81,8 @@ def build_parts(configuration: Configuration, seed: int, devices: Devices, map_f
     planner = planning.choice.build(PlannerSetup(plan_period_s, radius_m, limits, seed, arm_limits))
     shield = configuration.shield.build(ShieldSetup(period_s, radius_m, limits))
     budget_ns = configuration.loop.period_ns if planning.common.budget_ms is None else round(planning.common.budget_ms * 1e6)
+    if latency := planning.common.latency_ticks:
+        budget = fixed(latency * configuration.loop.period_ns)
     supervisor_setup = SupervisorSetup(period_s, limits, budget_ns, devices.operator is not None, arm_limits)
     return Parts(
         estimator=configuration.estimator.build(EstimatorSetup(period_s, radius_m, map_from_start, kinematics, imu_in_base_m)),
@@ -87,6 +94,7 @@ def build_parts(configuration: Configuration, seed: int, devices: Devices, map_f
             period_ticks=planning.common.period_ticks,
             latency_ticks=planning.common.latency_ticks,
             ready=ready,
+            budget=within(budget, budget_ns),
         ),
         shield=shield,
         supervisor=Supervisor(configuration.supervisor, supervisor_setup, shield, board),

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from estimators.belief import Belief
-from planners.planner import Plan, Planner
+from planners.planner import Anytime, Plan, Planner
 from planners.router import Route
 from runtime.background import Background
+from runtime.budget import Budget
 from runtime.fault_board import FaultBoard
 from runtime.faults import Fault, FaultReport
 from runtime.guards import checked, report
@@ -51,13 +52,25 @@ class PlannerRunner:
     lockstep the loop waits for it, in real time a plan that is not ready then is a fault and the robot stands down.
     """
 
-    def __init__(self, planner: Planner, board: FaultBoard, *, period_ticks: int, latency_ticks: int, ready: Ready) -> None:
-        """Take the planner, and what tells whether its plans are ready in time; nothing is called yet."""
+    def __init__(
+        self,
+        planner: Planner,
+        board: FaultBoard,
+        *,
+        period_ticks: int,
+        latency_ticks: int,
+        ready: Ready,
+        budget: Budget | None = None,
+    ) -> None:
+        """Take the planner, what tells whether its plans are ready in time, and how long each may take (none: it is not told)."""
         self._planner = planner
         self._board = board
         self._period = period_ticks
         self._latency = latency_ticks
         self._ready = ready
+        self._budget = budget
+        self._anytime = planner if isinstance(planner, Anytime) else None
+        self._told_ns = 0  # how long the plan in the making, or the last one, was given
         self._next_tick = 0
         self._plan = NO_PLAN
         self._pending: tuple[int, Future[Plan]] | None = None
@@ -74,9 +87,9 @@ class PlannerRunner:
         if belief.tick >= self._next_tick and self._pending is None:
             self._next_tick = belief.tick + self._period
             if self._background is None:
-                self._plan = self._guarded(lambda: self._planner.plan(belief, route))
+                self._plan = self._guarded(self._call(belief, route))
             else:
-                self._pending = belief.tick + self._latency, self._background.submit(lambda: self._planner.plan(belief, route))
+                self._pending = belief.tick + self._latency, self._background.submit(self._call(belief, route))
         return self._plan
 
     def is_idle_at(self, tick: int) -> bool:
@@ -101,6 +114,14 @@ class PlannerRunner:
         if self._background is not None:
             self._background.close()
 
+    def _call(self, belief: Belief, route: Route) -> Callable[[], Plan]:
+        """Return the call of the planner, with the time that it has from now on."""
+        if self._budget is not None:
+            self._told_ns = told_ns = self._budget(belief)
+            if (anytime := self._anytime) is not None:
+                return lambda: anytime.plan_within(belief, route, told_ns)
+        return lambda: self._planner.plan(belief, route)
+
     def _checkpoint(self) -> Checkpoint | None:
         """Return what to go on from; None while a plan is in the making."""
         if self._pending is not None:
@@ -124,7 +145,7 @@ class PlannerRunner:
 
     def _guarded(self, call: Callable[[], Plan]) -> Plan:
         try:
-            return checked(call(), Plan)
+            return replace(checked(call(), Plan), budget_ns=self._told_ns)
         except Exception as error:  # noqa: BLE001 - a planner is anyone's code; its failure must stop the robot, not the loop
             self._board.post(report(error, Fault.PLANNER_RAISED, "planner"))
-            return NO_PLAN
+            return replace(NO_PLAN, budget_ns=self._told_ns)

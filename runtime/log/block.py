@@ -225,6 +225,11 @@ class Row:
             raise ConfigurationError(f"tick {self.tick} of the log cannot be compared: {error}") from error
 
     @property
+    def budget_ns(self) -> int:
+        """How long the planner was given."""
+        return self._number(decided()["plan"].entity, "budget_ns")
+
+    @property
     def given(self) -> tuple[FaultReport, ...]:
         """The faults that nothing sensed leads to."""
         counts = self.block.values(decided()["verdict"].entity).get("given.count")

@@ -13,7 +13,7 @@ from typing import Literal
 from drivers.interface.geometry import SE2, SE3
 from runtime.log.urdf import Link
 
-SCHEMA_VERSION = 4  # of the replay columns; raised when a reader of the old ones would misread the new
+SCHEMA_VERSION = 5  # of the replay columns; raised when a reader of the old ones would misread the new
 READABLE_SCHEMAS = (SCHEMA_VERSION,)
 
 

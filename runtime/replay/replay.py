@@ -150,7 +150,7 @@ class _Replay:
     def _assembled(self) -> tuple[RecordedRobot, Parts]:
         same = not self._counterfactual
         robot = RecordedRobot(same_planner=same)
-        parts = assemble_recorded(self._configuration, self._header.seed, robot.ready)
+        parts = assemble_recorded(self._configuration, self._header.seed, robot.ready, robot.budget)
         robot.board = parts.board
         parts.warm_up()
         return robot, parts

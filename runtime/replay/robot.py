@@ -7,6 +7,7 @@ from concurrent.futures import Future
 
 from drivers.interface.commands import Command
 from drivers.interface.sensed import Sensed, Tick
+from estimators.belief import Belief
 from planners.planner import Plan
 from runtime.fault_board import FaultBoard
 from runtime.faults import Fault, FaultReport
@@ -51,6 +52,10 @@ class RecordedRobot:
 
     def write(self, command: Command) -> None:
         """Do nothing: what was driven was driven."""
+
+    def budget(self, belief: Belief) -> int:
+        """Return how long the planner was given at the present tick [ns]."""
+        return self.present().budget_ns
 
     def ready(self, tick: int, plan: Future[Plan]) -> bool:
         """Say whether a background plan that is due was ready in the recording; one that was is waited for."""

@@ -88,3 +88,31 @@ def test_in_real_time_a_plan_that_is_not_ready_is_a_fault_until_it_is() -> None:
 def test_no_plan_asks_for_nothing() -> None:
     assert NO_PLAN.base is None
     assert NO_PLAN.arm is None
+
+
+class Hurrying(Counting):
+    """A planner whose plan tells how long it was given [ns]."""
+
+    def plan_within(self, belief: object, route: Route, budget_ns: int) -> Plan:
+        if budget_ns < 0:
+            raise RuntimeError("no time at all")
+        return Plan(base=BodyTwist(float(budget_ns), 0.0, 0.0))
+
+
+@pytest.mark.parametrize("latency", [0, 1])
+def test_an_anytime_planner_is_told_how_long_it_has_and_the_plan_says_what_it_was_told(latency: int) -> None:
+    left = iter([7, -1, 5, 3])
+    told = PlannerRunner(
+        Hurrying(), FaultBoard(), period_ticks=1, latency_ticks=latency, ready=awaited, budget=lambda belief: next(left)
+    )
+    plans = [told.plan(belief(k), ROUTE) for k in range(4)][latency:]
+    told.close()
+    assert [plan.budget_ns for plan in plans] == [7, -1, 5, 3][: len(plans)]
+    assert [plan.base and plan.base.vx for plan in plans] == [7.0, None, 5.0, 3.0][: len(plans)]
+
+
+def test_other_planners_are_not_told_but_the_log_still_holds_it() -> None:
+    told = PlannerRunner(Counting(), FaultBoard(), period_ticks=1, latency_ticks=0, ready=awaited, budget=lambda belief: 9)
+    assert told.plan(belief(0), ROUTE) == Plan(
+        base=BodyTwist(), path_in_odom=told.plan(belief(0), ROUTE).path_in_odom, budget_ns=9
+    )
