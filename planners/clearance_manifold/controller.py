@@ -27,6 +27,7 @@ class Situation:
     margin_m: float  # M_min: least predicted clearance beyond rho_min ahead
     commitment: float  # a_pred
     free_m: float  # how far ahead it may go at most
+    most_m_s: float  # and how fast, whatever the clearance
     heading_rad: float  # where the robot should look, in odom
     feasible: bool
     robot: F64  # (2,), the point that is controlled, in odom
@@ -47,7 +48,7 @@ class ManifoldController:
         margin = min(max((at.margin_m - s.margin_low_m) / (s.margin_high_m - s.margin_low_m), 0.0), 1.0)
         cruise = s.speed_m_s * max(room, 0.0) * margin
         wanted = min(max(cruise + at.commitment * s.commitment_m_s, 0.0), s.speed_m_s)
-        return float(min(wanted, brakable(at.free_m, s.deceleration_m_s2, s.delay_s)))
+        return float(min(wanted, at.most_m_s, brakable(at.free_m, s.deceleration_m_s2, s.delay_s)))
 
     def command(self, at: Situation, yaw: float) -> tuple[BodyTwist, float]:
         """Return the twist and the speed along the manifold."""

@@ -13,27 +13,28 @@ import numpy as np
 
 from drivers.interface.commands import BodyTwist
 from drivers.interface.errors import ConfigurationError
-from drivers.interface.geometry import SE2, wrap_angle
+from drivers.interface.geometry import SE2
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import F64, Belief
 from estimators.field_query import sample
 from planners.clearance_manifold.chart import Chart, lay_chart
-from planners.clearance_manifold.control_kernels import brakable, known_length
+from planners.clearance_manifold.control_kernels import brakable
 from planners.clearance_manifold.controller import ManifoldController, Situation
-from planners.clearance_manifold.diagnostics import ManifoldDiagnostics
+from planners.clearance_manifold.diagnostics import ManifoldDiagnostics, diagnose
+from planners.clearance_manifold.drawings import drawn
 from planners.clearance_manifold.extraction import Scene, Solver
-from planners.clearance_manifold.manifold import Manifold, Stations
+from planners.clearance_manifold.lookout import Lookout, Outlook
+from planners.clearance_manifold.lookout_kernels import Seen
+from planners.clearance_manifold.manifold import Stations
 from planners.clearance_manifold.prediction import ArrivalField, Predicted
-from planners.clearance_manifold.properties import Properties, check
+from planners.clearance_manifold.properties import check
+from planners.clearance_manifold.reading import Reader
 from planners.clearance_manifold.ridge_kernels import Ground, Sections
 from planners.clearance_manifold.settings import ClearanceManifoldSettings
-from planners.clearance_manifold.tracker import Continuation, Tracker, heading
+from planners.clearance_manifold.tracker import Category, Continuation, Tracker
 from planners.clearance_manifold.warm_up import rehearse
-from planners.planner import Drawing, Plan, PlannerSetup
+from planners.planner import Plan, PlannerSetup
 from planners.router import Route
-
-LOOK_AT_MOST_DEG = 120.0  # what closes in from behind is not turned to
-UNKNOWN_GAP_M = 0.15  # shorter stretches of unknown cells are holes in a depth image, not the edge of what was seen
 
 
 class ClearanceManifold:
@@ -55,6 +56,8 @@ class ClearanceManifold:
         self._field = ArrivalField(settings.prediction)
         self._solver = Solver(settings.solver, settings.tracker, self._stations, setup.robot_radius_m, setup.period_s)
         self._tracker = Tracker(settings.tracker, settings.solver, self._solver, self._stations, setup.period_s)
+        self._reader = Reader(settings, self._stations, self._solver.least_m)
+        self._lookout = Lookout(settings.lookout, setup.limits, setup.robot_radius_m, settings.controller.speed_m_s)
         self._controller = ManifoldController(settings.controller, setup.limits)
         self._chart: Chart | None = None
         self._arc_m = 0.0  # of the robot on the chart
@@ -75,6 +78,7 @@ class ClearanceManifold:
         if reason:
             self._chart = None
             self._tracker.reset()
+            self._lookout.reset()
             self._asked = BodyTwist()
             return Plan(BodyTwist(), diagnostics=ManifoldDiagnostics(fallback_category="", stopped=reason))
         pose = belief.odom_from_base
@@ -83,10 +87,12 @@ class ClearanceManifold:
         assert self._chart is not None
         scene = self._scene(self._chart, predicted, belief, point)
         told = self._tracker.advance(scene, belief, new_goal)
-        situation = self._situation(told, belief, point, predicted.closing)
+        outlook = self._outlook(scene, told, belief)
+        left_m = self._chart.length_m - self._arc_m
+        situation = self._reader.situation(told.manifold, belief, point, left_m, predicted.closing, outlook)
         twist, speed = self._controller.command(situation, pose.yaw)
         self._asked = self._smoothed(twist)
-        return self._plan(scene, told, situation, self._asked, speed)
+        return self._plan(scene, told, situation, outlook, speed)
 
     def _smoothed(self, twist: BodyTwist) -> BodyTwist:
         """Return the twist a share of the way from the one asked before."""
@@ -159,105 +165,30 @@ class ClearanceManifold:
         left_m = chart.length_m - self._arc_m
         return max(self._stations.own + 2, int(np.searchsorted(self._stations.arcs_m, left_m, side="right")))
 
-    def _situation(self, told: Continuation, belief: Belief, point: F64, closing: F64) -> Situation:
-        """Project the robot onto the manifold and read what the controller needs."""
-        manifold, own, s = told.manifold, self._stations.own, self._settings.controller
-        tangent = manifold.tangent()
-        off = point - manifold.points[own]
-        error = off - float(off @ tangent) * tangent
-        clearance = manifold.clearance_m[manifold.ahead]
-        near = clearance[manifold.arcs_m[manifold.ahead] <= manifold.arcs_m[own] + s.heading_look_ahead_m]
-        look = max(2, int(np.searchsorted(self._stations.arcs_m[own:], s.heading_look_ahead_m)) + 1)
-        return Situation(
-            error=error,
-            tangent=tangent,
-            ridge_clearance_m=float(near.min()) if near.size else 0.0,
-            margin_m=float(clearance.min()) - self._solver.least_m if clearance.size else 0.0,
-            commitment=self._commitment(manifold, belief),
-            free_m=self._free_length(manifold, belief),
-            heading_rad=self._look(heading(manifold.points[own : own + look]), closing, point),
-            feasible=manifold.valid > 1,
-            robot=point,
-            closing=closing,
-        )
-
-    def _look(self, along_rad: float, closing: F64, point: F64) -> float:
-        """Return where to look: along the manifold, but turned as far as it takes to keep in view what closes in."""
-        if closing[4] == 0.0:
-            return along_rad
-        s = self._settings
-        room_rad = math.radians(max(0.0, 0.5 * s.prediction.fov_deg - s.controller.view_margin_deg))
-        off_rad = wrap_angle(math.atan2(closing[1] - point[1], closing[0] - point[0]) - along_rad)
-        if abs(off_rad) > math.radians(LOOK_AT_MOST_DEG):
-            return along_rad
-        return along_rad + math.copysign(max(0.0, abs(off_rad) - room_rad), off_rad)
-
-    def _commitment(self, manifold: Manifold, belief: Belief) -> float:
-        """Return a_pred, the largest share of the prediction with which all of the manifold keeps rho_min."""
-        if not manifold.valid:
-            return 0.0
-        now = sample(belief.clearance.clearance_m, belief.clearance.lattice, manifold.points[manifold.ahead])
-        then, least = manifold.clearance_m[manifold.ahead], self._solver.least_m
-        short = then < least
-        if not short.any():
-            return 1.0
-        spare, loss = np.maximum(now - least, 0.0)[short], np.maximum(now - then, 1e-9)[short]
-        return float(min(max(float(np.min(spare / loss)), 0.0), 1.0))
-
-    def _free_length(self, manifold: Manifold, belief: Belief) -> float:
-        """Return how far ahead the robot may get: the end of what is wide enough, known, and on this side of the goal."""
+    def _outlook(self, scene: Scene, told: Continuation, belief: Belief) -> Outlook:
+        """Return what unseen walkers leave of the way along the manifold."""
         assert self._chart is not None
-        s, lattice = self._settings.controller, belief.clearance.lattice
-        if manifold.valid == 0:
-            return 0.0
-        corner = np.array([lattice.x_m, lattice.y_m])
-        known_m = known_length(
-            belief.clearance.known, corner, lattice.cell_m, manifold.points[manifold.own :], s.body_m, UNKNOWN_GAP_M
-        )
-        goal_m = max(0.0, self._chart.length_m - self._arc_m)
-        reach_m = math.inf if manifold.whole else manifold.reach_m
-        return float(min(reach_m, max(0.0, known_m - s.body_m), goal_m))
+        field, arcs_m = belief.clearance, self._arc_m + self._lookout.arcs_m
+        at, normal, _ = self._chart.frames(arcs_m, 1.0)
+        way = at + np.interp(arcs_m, scene.arcs_m, told.manifold.offset_m)[:, None] * normal
+        lattice = field.lattice
+        seen = Seen(field.known, field.clearance_m, self._field.age_s, lattice.x_m, lattice.y_m, lattice.cell_m)
+        velocity = SE2(0.0, 0.0, belief.odom_from_base.yaw).apply(np.array([belief.twist.vx, belief.twist.vy]))
+        along_m_s = max(0.0, float(velocity @ told.manifold.tangent()))
+        return self._lookout.watch(seen, way, normal, along_m_s, self._setup.period_s)
 
-    def _plan(self, scene: Scene, told: Continuation, at: Situation, twist: BodyTwist, speed: float) -> Plan:
+    def _plan(self, scene: Scene, told: Continuation, at: Situation, outlook: Outlook, speed: float) -> Plan:
         s, manifold = self._settings, told.manifold
-        error_m = float(np.hypot(*at.error))
         stops = speed <= brakable(at.free_m, s.controller.deceleration_m_s2, s.controller.delay_s) + 1e-9
+        gain = s.controller.lateral_gain_per_s
         held = check(
             told, least_m=self._solver.least_m, lipschitz_m_s=s.tracker.lipschitz_m_s,
-            lateral_gain_per_s=s.controller.lateral_gain_per_s, error_m=error_m, stops=stops,
+            lateral_gain_per_s=gain, error_m=float(np.hypot(*at.error)), stops=stops,
         )  # fmt: skip
-        tracking = told.category.value == "none"
-        self._ticks += (int(tracking), 1)
-        diagnostics = self._diagnostics(told, at, held, speed, error_m)
-        return Plan(
-            twist, path_in_odom=manifold.points[manifold.ahead], diagnostics=diagnostics, drawings=_drawn(scene, manifold)
-        )
-
-    def _diagnostics(
-        self, told: Continuation, at: Situation, held: Properties, speed: float, error_m: float
-    ) -> ManifoldDiagnostics:
-        return ManifoldDiagnostics(
-            fallback_category=told.category.value,
-            trigger=told.trigger,
-            stopped="" if told.manifold.valid else "no passage is wide enough here",
-            tracking=told.category.value == "none",
-            utilisation=float(self._ticks[0] / self._ticks[1]),
-            deviation_m=told.deviation_m,
-            reach_m=told.manifold.reach_m,
-            free_m=at.free_m,
-            rho_ridge_m=at.ridge_clearance_m,
-            margin_m=at.margin_m,
-            commitment=at.commitment,
-            speed_m_s=speed,
-            error_m=error_m,
-            bound_m=told.normal_speed_m_s / self._settings.controller.lateral_gain_per_s,
-            p1=held.p1_traversable,
-            p2=held.p2_progress,
-            p3=held.p3_branch,
-            p4=held.p4_regular,
-            p5=held.p5_reach,
-            p6=held.p6_termination,
-        )
+        self._ticks += (int(told.category is Category.NONE), 1)
+        said = diagnose(told, at, held, outlook, speed, gain, float(self._ticks[0] / self._ticks[1]))
+        drawings = drawn(scene, manifold, self._tracker.tube_m, at.closing, outlook.look_at)
+        return Plan(self._asked, path_in_odom=manifold.points[manifold.ahead], diagnostics=said, drawings=drawings)
 
     def snapshot(self) -> bytes:
         """Return the whole state."""
@@ -270,6 +201,7 @@ class ClearanceManifold:
             asked=(self._asked.vx, self._asked.vy, self._asked.wz),
             **self._field.state(),
             **self._tracker.state(),
+            **self._lookout.state(),
         )
 
     def restore(self, snapshot: bytes) -> None:
@@ -280,15 +212,4 @@ class ClearanceManifold:
         self._asked = BodyTwist(*state["asked"].tolist())
         self._field.take(state)
         self._tracker.take(state)
-
-
-def _drawn(scene: Scene, manifold: Manifold) -> tuple[Drawing, ...]:
-    """Return centre line, ridge and box, where there is one."""
-    at, normal, reach = (part[manifold.ahead] for part in scene.sections)
-    lines = (
-        ("centre_line", scene.sections.at),
-        ("ridge", at + manifold.ridge_m[manifold.ahead, None] * normal),
-        ("box_right", at + np.maximum(manifold.low_m[manifold.ahead], reach[:, 0])[:, None] * normal),
-        ("box_left", at + np.minimum(manifold.high_m[manifold.ahead], reach[:, 1])[:, None] * normal),
-    )
-    return tuple(Drawing(name, points) for name, points in lines)
+        self._lookout.take(state)

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from drivers.interface.samples import frozen_array
 from estimators.belief import F32, F64, Belief, ClearanceField, Lattice
 from estimators.clearance import distance_to
-from estimators.rolling import transfer
+from estimators.memory.rolling import transfer
+from planners.clearance_manifold.closing import ClosingMemory
 from planners.clearance_manifold.prediction_kernels import Arrival, free_on_arrival, nearest_closing, observe
 from planners.clearance_manifold.settings import PredictionSettings
 
@@ -40,6 +41,7 @@ class ArrivalField:
         self._lattice: Lattice | None = None
         self._age_s: F32 = np.zeros((0, 0), np.float32)
         self._stamp_ns = 0
+        self._closing = ClosingMemory(settings.carry_s)
 
     def warm_up(self) -> None:
         """Compile the kernels, on read-only arrays as a belief's are."""
@@ -52,7 +54,7 @@ class ArrivalField:
     def update(self, belief: Belief) -> Predicted:
         """Take in what is seen now and return the prediction on the belief's lattice."""
         field, pose = belief.clearance, belief.odom_from_base
-        self._observe(belief)
+        elapsed_s = self._observe(belief)
         corner = np.array([field.lattice.x_m, field.lattice.y_m])
         robot, arrival = np.array([pose.x, pose.y]), self._arrival(belief.twist.speed_m_s)
         cell_m = field.lattice.cell_m
@@ -60,6 +62,7 @@ class ArrivalField:
         closing = nearest_closing(field.clearance_m, field.rate_m_s, corner, cell_m, robot, CLOSING_M_S)
         if closing[4] < LEAST_CELLS:
             closing[4] = 0.0
+        closing = self._closing.update(closing, field, self._age_s, elapsed_s)
         return Predicted(distance_to(free == 0, cell_m), closing, arrival.speed_m_s)
 
     @property
@@ -72,7 +75,8 @@ class ArrivalField:
         expected = min(max(speed_m_s, s.speed_floor_m_s), s.nominal_speed_m_s)
         return Arrival(expected, s.horizon_max_s, s.trust_decay_s, s.confidence_decay_s)
 
-    def _observe(self, belief: Belief) -> None:
+    def _observe(self, belief: Belief) -> float:
+        """Let what is in view be new and the rest grow older; return by how much [s]."""
         field, pose = belief.clearance, belief.odom_from_base
         elapsed_s = max(0.0, (belief.stamp_ns - self._stamp_ns) / SECOND_NS) if self._lattice is not None else 0.0
         self._age_s = _carried(self._age_s, self._lattice, field)
@@ -83,12 +87,14 @@ class ArrivalField:
             self._age_s, field.known, corner, field.lattice.cell_m, np.array([pose.x, pose.y, pose.yaw]),
             math.radians(0.5 * s.fov_deg), s.range_m, elapsed_s,
         )  # fmt: skip
+        return elapsed_s
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Return what is remembered, as named arrays."""
         at = self._lattice
         corner = np.zeros(0) if at is None else np.array([at.x_m, at.y_m, at.cell_m])
-        return {"age_corner": corner, "age_s": self._age_s, "age_stamp_ns": np.array([self._stamp_ns], np.int64)}
+        ages = {"age_corner": corner, "age_s": self._age_s, "age_stamp_ns": np.array([self._stamp_ns], np.int64)}
+        return ages | self._closing.state()
 
     def take(self, state: dict[str, NDArray[Any]]) -> None:
         """Take over what `state` gave."""
@@ -96,6 +102,7 @@ class ArrivalField:
         corner = state["age_corner"].tolist()
         self._lattice = Lattice(*corner, *self._age_s.shape) if corner else None
         self._stamp_ns = int(state["age_stamp_ns"][0])
+        self._closing.take(state)
 
 
 def _carried(age_s: F32, before: Lattice | None, field: ClearanceField) -> F32:

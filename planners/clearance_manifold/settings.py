@@ -20,6 +20,9 @@ class PredictionSettings(Settings):
     speed_floor_m_s: float = Field(default=0.05, gt=0.0, le=1.0, description="v_exec,floor: the least speed they are expected at")
     fov_deg: float = Field(default=120.0, gt=0.0, le=360.0, description="what the camera sees, for the confidence")
     range_m: float = Field(default=2.5, gt=0.1, le=20.0, description="how far it sees")
+    carry_s: float = Field(
+        default=1.5, ge=0.0, le=10.0, description="what closes in is reckoned with for so long after it left the view"
+    )
 
 
 class ChartSettings(Settings):
@@ -107,11 +110,28 @@ class ControllerSettings(Settings):
     )
 
 
+class LookoutSettings(Settings):
+    """Beyond the paper: who may step out of what is not seen."""
+
+    enabled: bool = Field(default=True, description="off: only what is seen counts, as in the paper")
+    walker_speed_m_s: float = Field(default=1.25, gt=0.0, le=3.0, description="fastest walker who is reckoned with")
+    patience_s: float = Field(
+        default=4.0, gt=0.0, le=60.0, description="waited for that walker; after it slower ones, after twice of it none"
+    )
+    margin_m: float = Field(default=0.15, ge=0.0, le=1.0, description="between the robot and who steps out")
+    least_width_m: float = Field(default=0.4, ge=0.1, le=2.0, description="narrower openings let nobody through")
+    side_m: float = Field(default=2.4, gt=0.2, le=10.0, description="how far to the sides of the way is looked")
+    ahead_m: float = Field(default=2.4, gt=0.5, le=10.0, description="how far along it")
+    creep_m_s: float = Field(default=0.15, ge=0.0, le=1.0, description="speed where the robot stands in an opening already")
+    reaction_s: float = Field(default=0.2, ge=0.0, le=2.0, description="from what is seen to what the base does")
+
+
 class ClearanceManifoldSettings(Settings):
-    """The three layers."""
+    """The three layers, and the look-out."""
 
     prediction: PredictionSettings = PredictionSettings()
     chart: ChartSettings = ChartSettings()
     solver: SolverSettings = SolverSettings()
     tracker: TrackerSettings = TrackerSettings()
     controller: ControllerSettings = ControllerSettings()
+    lookout: LookoutSettings = LookoutSettings()

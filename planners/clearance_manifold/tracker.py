@@ -70,6 +70,11 @@ class Tracker:
         self._looked_ns = 0
 
     @property
+    def tube_m(self) -> float:
+        """Radius of the tube that a station is searched in, from one tick to the next."""
+        return self._settings.tube_m + self._settings.lipschitz_m_s * self._period_s
+
+    @property
     def holds(self) -> bool:
         """Whether there is a manifold to continue."""
         return len(self._arcs_m) > 0

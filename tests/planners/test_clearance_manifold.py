@@ -81,7 +81,8 @@ def test_the_manifold_goes_around_what_stands_in_the_way_and_stays_in_the_box():
     path = plan.path_in_odom
     gap = np.minimum(np.hypot(path[:, 0] - 2.0, path[:, 1] - 0.2) - 0.3, 1.0 - np.abs(path[:, 1]))
     assert gap[path[:, 0] < 2.9].min() >= 0.2 - 0.03
-    assert {drawing.name for drawing in plan.drawings} == {"centre_line", "ridge", "box_left", "box_right"}
+    drawn = {drawing.name for drawing in plan.drawings}
+    assert drawn == {"centre_line", "manifold", "ridge", "box_left", "box_right", "tube_left", "tube_right"}
 
 
 def test_tracking_error_keeps_the_bound_on_a_moving_manifold():

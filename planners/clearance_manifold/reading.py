@@ -1,0 +1,96 @@
+"""What layer 3 reads of a manifold: the 1-D quantities of proposition 3, at the robot."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from drivers.interface.geometry import wrap_angle
+from estimators.belief import F64, Belief
+from estimators.field_query import sample
+from planners.clearance_manifold.control_kernels import known_length
+from planners.clearance_manifold.controller import Situation
+from planners.clearance_manifold.lookout import Outlook
+from planners.clearance_manifold.manifold import Manifold, Stations
+from planners.clearance_manifold.settings import ClearanceManifoldSettings
+from planners.clearance_manifold.tracker import heading
+
+LOOK_AT_MOST_DEG = 120.0  # what closes in from behind is not turned to
+UNKNOWN_GAP_M = 0.15  # shorter stretches of unknown cells are holes in a depth image, not the edge of what was seen
+
+
+class Reader:
+    """Projects the robot onto a manifold."""
+
+    def __init__(self, settings: ClearanceManifoldSettings, stations: Stations, least_m: float) -> None:
+        """Take the settings, where the stations stand, and rho_min."""
+        self._settings, self._stations, self._least_m = settings, stations, least_m
+
+    def situation(
+        self, manifold: Manifold, belief: Belief, point: F64, left_m: float, closing: F64, outlook: Outlook
+    ) -> Situation:
+        """Return what the controller needs.
+
+        Args:
+            manifold: of this tick.
+            belief: the field that it lies in.
+            point: that follows it, in odom, shape (2,).
+            left_m: to the end of the chart, the goal.
+            closing: what closes in, shape (5,).
+            outlook: what unseen walkers leave of the way.
+        """
+        own, s = self._stations.own, self._settings.controller
+        tangent = manifold.tangent()
+        off = point - manifold.points[own]
+        clearance = manifold.clearance_m[manifold.ahead]
+        near = clearance[manifold.arcs_m[manifold.ahead] <= manifold.arcs_m[own] + s.heading_look_ahead_m]
+        look = max(2, int(np.searchsorted(self._stations.arcs_m[own:], s.heading_look_ahead_m)) + 1)
+        along_rad = heading(manifold.points[own : own + look])
+        return Situation(
+            error=off - float(off @ tangent) * tangent,
+            tangent=tangent,
+            ridge_clearance_m=float(near.min()) if near.size else 0.0,
+            margin_m=float(clearance.min()) - self._least_m if clearance.size else 0.0,
+            commitment=self._commitment(manifold, belief),
+            free_m=min(self._free_length(manifold, belief, left_m), outlook.free_m),
+            most_m_s=outlook.speed_m_s,
+            heading_rad=self._look(along_rad, closing, point, outlook.look_at),
+            feasible=manifold.valid > 1,
+            robot=point,
+            closing=closing,
+        )
+
+    def _look(self, along_rad: float, closing: F64, point: F64, look_at: F64 | None) -> float:
+        """Return where to look: along the manifold, but turned as far as it takes to keep in view what closes in, or may."""
+        s, watched = self._settings, closing[:2] if closing[4] > 0.0 else look_at
+        if watched is None:
+            return along_rad
+        room_rad = math.radians(max(0.0, 0.5 * s.prediction.fov_deg - s.controller.view_margin_deg))
+        off_rad = wrap_angle(math.atan2(watched[1] - point[1], watched[0] - point[0]) - along_rad)
+        if abs(off_rad) > math.radians(LOOK_AT_MOST_DEG):
+            return along_rad
+        return along_rad + math.copysign(max(0.0, abs(off_rad) - room_rad), off_rad)
+
+    def _commitment(self, manifold: Manifold, belief: Belief) -> float:
+        """Return a_pred, the largest share of the prediction with which all of the manifold keeps rho_min."""
+        if not manifold.valid:
+            return 0.0
+        now = sample(belief.clearance.clearance_m, belief.clearance.lattice, manifold.points[manifold.ahead])
+        then, least = manifold.clearance_m[manifold.ahead], self._least_m
+        short = then < least
+        if not short.any():
+            return 1.0
+        spare, loss = np.maximum(now - least, 0.0)[short], np.maximum(now - then, 1e-9)[short]
+        return float(min(max(float(np.min(spare / loss)), 0.0), 1.0))
+
+    def _free_length(self, manifold: Manifold, belief: Belief, left_m: float) -> float:
+        """Return how far ahead the robot may get: the end of what is wide enough, known, and on this side of the goal."""
+        s, lattice = self._settings.controller, belief.clearance.lattice
+        if manifold.valid == 0:
+            return 0.0
+        corner = np.array([lattice.x_m, lattice.y_m])
+        ahead = manifold.points[manifold.own :]
+        known_m = known_length(belief.clearance.known, corner, lattice.cell_m, ahead, s.body_m, UNKNOWN_GAP_M)
+        reach_m = math.inf if manifold.whole else manifold.reach_m
+        return float(min(reach_m, max(0.0, known_m - s.body_m), max(0.0, left_m)))
