@@ -9,11 +9,14 @@ from dataclasses import dataclass, field
 
 from drivers.interface.devices import DeviceState
 from drivers.interface.geometry import SE2
+from drivers.interface.samples import TruthSample
 from runtime.cycle import Cycle
 from runtime.faults import Fault, FaultReport, Response
 from runtime.mission import MissionTracker
 from runtime.watch import SECOND_NS
 
+STANDING_M_S, STANDING_RAD_S = 0.05, 0.1  # slower than this in truth is standing
+STANDING_NS = 300_000_000  # who has stood for so long when something touches him was hit, and did not drive into it
 STATES_NOT_FAULTS = frozenset({Fault.STARTING, Fault.PAUSED, Fault.NOT_ENABLED})
 
 
@@ -45,6 +48,7 @@ class Tally:
     end_ns: int = 0
     path_length_m: float = 0.0
     min_clearance_m: float = math.inf
+    hit_while_standing: bool = False
     odometry_error_m: float = math.nan
     odometry_error_rad: float = math.nan
     faults: dict[tuple[Fault, str], FaultTally] = field(default_factory=dict)  # by fault and device, as first seen
@@ -78,6 +82,7 @@ class Referee:
         self._interrupted = interrupted
         self._progress = progress
         self._last_pose: SE2 | None = None
+        self._moved_ns = 0  # when the robot last moved, by the truth
 
     def is_over(self, cycle: Cycle) -> bool:
         """Take one cycle into account; return whether it was the last."""
@@ -92,7 +97,7 @@ class Referee:
         self._latched_since_ns = self._since(cycle.verdict.response is Response.LATCH, now_ns)
         if self._interrupted():
             return Outcome.INTERRUPTED
-        if truth is not None and (truth.contacts or truth.clearance_m <= 0.0):
+        if truth is not None and _touches(truth):
             return Outcome.COLLIDED
         if arrived or cycle.plan.accomplished:
             return Outcome.REACHED
@@ -116,6 +121,7 @@ class Referee:
         pose = cycle.belief.map_from_base
         if truth is not None:
             tally.min_clearance_m = min(tally.min_clearance_m, truth.clearance_m)
+            self._watch_motion(truth, tick.start_ns)
             error = truth.map_from_base.inverse() @ pose
             tally.odometry_error_m, tally.odometry_error_rad = math.hypot(error.x, error.y), abs(error.yaw)
             pose = truth.map_from_base
@@ -125,3 +131,14 @@ class Referee:
         for report in cycle.verdict.faults:
             if report.fault not in STATES_NOT_FAULTS:
                 tally.faults.setdefault((report.fault, report.device), FaultTally(tick.index, report)).ticks += 1
+
+    def _watch_motion(self, truth: TruthSample, now_ns: int) -> None:
+        """Tell a hit on a robot that stands from a collision that it drove into; what touches pushes, so that goes first."""
+        if _touches(truth):
+            self.tally.hit_while_standing = now_ns - self._moved_ns >= STANDING_NS
+        elif truth.twist.speed_m_s >= STANDING_M_S or abs(truth.twist.wz) >= STANDING_RAD_S:
+            self._moved_ns = now_ns
+
+
+def _touches(truth: TruthSample) -> bool:
+    return bool(truth.contacts) or truth.clearance_m <= 0.0

@@ -76,6 +76,7 @@ class RunReport:
     realtime_refused: tuple[str, ...]
     recording: RecordingFigures | None
     error: str = ""  # what ended the run, when it was a failure of the software
+    hit_while_standing: bool = False  # it collided, but something else drove into it: it had stood for 0.3 s
 
     def write(self, path: Path) -> None:
         """Write the JSON.
@@ -105,6 +106,8 @@ class RunReport:
             size = f"{self.recording.path} ({self.recording.bytes / 1e6:.1f} MB)"
             rows.append(("recording", f"{size}; {self.recording.fault}" if self.recording.fault else size))
             rows += [("stop recorded", path) for path in self.recording.incidents]
+        if self.hit_while_standing:
+            rows.append(("collision", "it was hit while it stood"))
         if self.error:
             rows.append(("ended by", self.error))
         for name, value in rows:

@@ -169,6 +169,7 @@ class _Run:
             realtime_refused=self._refused,
             recording=_figures(self._options.log, recorded, tally.duration_s),
             error=_error(failure),
+            hit_while_standing=tally.hit_while_standing,
         )
 
 
