@@ -10,7 +10,7 @@ from drivers.interface.samples import frozen_array
 from drivers.interface.settings import Settings
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import F32, OCCUPIED, UNKNOWN, ClearanceField, Lattice, Mask, OccupancyGrid
-from estimators.rolling import transfer
+from estimators.memory.rolling import transfer
 
 PAPER_STEP_S = 0.2  # the period that the paper's smoothing factor is meant for
 RATE_MASK = cv2.DIST_MASK_5  # integer chamfer, within 2 % of the true distance in half the time: enough for a rate

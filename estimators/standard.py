@@ -14,25 +14,25 @@ from drivers.interface.settings import Settings
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import FREE, Belief, EstimatorFault, Track
 from estimators.clearance import ClearanceEstimator, ClearanceSettings
-from estimators.depth_grid import DepthGrid, DepthGridSettings
 from estimators.estimator import EstimatorSetup
-from estimators.grid_filter import GridFilter
+from estimators.grid.depth_grid import DepthGrid, DepthGridSettings
+from estimators.grid.grid_filter import GridFilter
+from estimators.grid.labelling import FrameLabels, FrameSource
+from estimators.grid.scan_grid import ScanGrid, ScanGridSettings
 from estimators.joint_state import pack_joints, unpack_joints
-from estimators.labelling import FrameLabels, FrameSource
-from estimators.marker_settings import MarkerSettings
-from estimators.memory import MemorySettings, memory_of
-from estimators.odometry import Odometry, OdometryEstimate, latest_valid_ns
-from estimators.odometry_choice import OdometrySettings, build_odometry
-from estimators.registration import ScanRegistration, SurfaceSource
-from estimators.registration_settings import RegistrationSettings
-from estimators.scan_grid import ScanGrid, ScanGridSettings
-from estimators.tracking_settings import TrackingSettings
-from estimators.truth_odometry import TruthOdometry
-from estimators.truth_tracks import tracks_from_truth
+from estimators.memory.memory import MemorySettings, memory_of
+from estimators.odometry.odometry import Odometry, OdometryEstimate, latest_valid_ns
+from estimators.odometry.odometry_choice import OdometrySettings, build_odometry
+from estimators.odometry.truth_odometry import TruthOdometry
+from estimators.registration.registration import ScanRegistration, SurfaceSource
+from estimators.registration.registration_settings import RegistrationSettings
+from estimators.tracks.marker_settings import MarkerSettings
+from estimators.tracks.tracking_settings import TrackingSettings
+from estimators.tracks.truth_tracks import tracks_from_truth
 
 if TYPE_CHECKING:
-    from estimators.marker_tracking import MarkerTracker
-    from estimators.tracking import GridTracker
+    from estimators.tracks.marker_tracking import MarkerTracker
+    from estimators.tracks.tracking import GridTracker
 
 
 class StandardSettings(Settings):
@@ -205,7 +205,7 @@ class StandardEstimator:
 def _tracker_of(settings: StandardSettings) -> GridTracker | None:
     if settings.tracks != "grid":
         return None
-    from estimators.tracking import GridTracker  # noqa: PLC0415 - FilterPy brings 40 MB that only those who filter need carry
+    from estimators.tracks.tracking import GridTracker  # noqa: PLC0415 - FilterPy brings 40 MB that only those who filter need carry
 
     return GridTracker(settings.tracking)
 
@@ -213,7 +213,7 @@ def _tracker_of(settings: StandardSettings) -> GridTracker | None:
 def _marker_tracker_of(settings: StandardSettings) -> MarkerTracker | None:
     if settings.tracks != "aruco":
         return None
-    from estimators.marker_tracking import MarkerTracker  # noqa: PLC0415 - likewise
+    from estimators.tracks.marker_tracking import MarkerTracker  # noqa: PLC0415 - likewise
 
     return MarkerTracker(settings.markers)
 

@@ -123,7 +123,7 @@ def drive_square(case: SquareCase) -> tuple[Drift, ...]:
 
 
 def _drift(sensed: tuple[Sensed, ...], keys: dict[str, Any], kinematics: Any) -> Drift:
-    from estimators.odometry_choice import OdometrySettings, build_odometry  # noqa: PLC0415
+    from estimators.odometry.odometry_choice import OdometrySettings, build_odometry  # noqa: PLC0415
 
     odometry = build_odometry(OdometrySettings.model_validate(keys), kinematics)
     odometry.warm_up()

@@ -15,8 +15,8 @@ from drivers.wheel_log import WheelLog, read_wheel_log
 from estimators.calibration.drive import Drive, References
 from estimators.calibration.points import calibrate_wheels_to_points
 from estimators.calibration.wheels import wheel_path
-from estimators.trajectory_error import absolute_error_m, relative_error_m
-from estimators.wheel_geometry import TwoSided
+from estimators.odometry.trajectory_error import absolute_error_m, relative_error_m
+from estimators.odometry.wheel_geometry import TwoSided
 
 F64 = NDArray[np.float64]
 APART = 8  # samples, one second of the recording

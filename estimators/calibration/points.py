@@ -11,7 +11,7 @@ from estimators.belief import F64
 from estimators.calibration.drive import Drive
 from estimators.calibration.identify import Identified, identify
 from estimators.calibration.wheels import geometry_of, unknowns_of, wheel_path
-from estimators.trajectory_error import aligned
+from estimators.odometry.trajectory_error import aligned
 
 POINT_STD_M = 0.02  # of a position on the wheels' path, after alignment
 EASE = 2.0  # positions say less than poses do, so less is asked of them

@@ -12,7 +12,7 @@ from drivers.interface.kinematics import OmniThreeWheel, SkidSteer, WheelKinemat
 from estimators.belief import F64
 from estimators.calibration.drive import Drive, relative, ways
 from estimators.calibration.identify import Identified, Unknown, identify
-from estimators.wheel_geometry import OmniGeometry, SkidSteerGeometry, TwoSided
+from estimators.odometry.wheel_geometry import OmniGeometry, SkidSteerGeometry, TwoSided
 
 MOMENT_S = 0.03  # to either side
 WAY_STD = (0.001, 0.001, 0.001)  # m, m, rad: of a way from one reference to the next

@@ -12,8 +12,8 @@ from drivers.interface.samples import DepthFrame, Intrinsics, Stamp, frozen_arra
 from drivers.interface.seeds import stream
 from drivers.interface.sensed import Sensed, Tick
 from estimators.clearance import ClearanceEstimator, ClearanceSettings
-from estimators.depth_grid import DepthGrid, DepthGridSettings
 from estimators.estimator import EstimatorSetup
+from estimators.grid.depth_grid import DepthGrid, DepthGridSettings
 from estimators.standard import StandardEstimator, StandardSettings
 
 BASE_FROM_OPTICAL = SE3(0.1, 0.0, 0.4) @ BODY_FROM_OPTICAL

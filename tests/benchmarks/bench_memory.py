@@ -9,12 +9,12 @@ import numpy as np
 from drivers.interface.geometry import SE2
 from estimators.belief import OCCUPIED, UNKNOWN, Lattice, OccupancyGrid, Track
 from estimators.clearance import ClearanceEstimator, ClearanceSettings
-from estimators.depth_grid import DepthGrid, DepthGridSettings
-from estimators.labelling import FrameLabels
-from estimators.memory import Memory, MemorySettings, memory_of
-from estimators.remembered import Remembered
-from estimators.rolling import lattice_around
-from estimators.tracking import GridTracker, TrackingSettings
+from estimators.grid.depth_grid import DepthGrid, DepthGridSettings
+from estimators.grid.labelling import FrameLabels
+from estimators.memory.memory import Memory, MemorySettings, memory_of
+from estimators.memory.remembered import Remembered
+from estimators.memory.rolling import lattice_around
+from estimators.tracks.tracking import GridTracker, TrackingSettings
 from tests.benchmarks.bench_estimators import FRAME_NS, hall
 
 CELL_M, RADIUS_M = 0.05, 0.12

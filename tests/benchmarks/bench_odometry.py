@@ -11,8 +11,8 @@ from drivers.interface.kinematics import OmniThreeWheel
 from drivers.interface.mission import Mission
 from drivers.interface.samples import ImuSample, Stamp, WheelSample
 from drivers.interface.sensed import Sensed, Tick
-from estimators.odometry import Odometry
-from estimators.odometry_choice import OdometrySettings, build_odometry
+from estimators.odometry.odometry import Odometry
+from estimators.odometry.odometry_choice import OdometrySettings, build_odometry
 from tests.benchmarks.figure import Figure, of_distribution
 
 GYRO_NS, WHEELS_NS = 5_000_000, 10_000_000

@@ -4,11 +4,11 @@ import itertools
 from collections.abc import Callable
 
 from drivers.interface.geometry import SE2
-from estimators.depth_grid import DepthGrid, DepthGridSettings
-from estimators.grid_memory import GridMemory, GridMemorySettings
-from estimators.registration import ScanRegistration, SurfaceSource
-from estimators.registration_settings import RegistrationSettings
-from estimators.scan_grid import ScanGridSettings
+from estimators.grid.depth_grid import DepthGrid, DepthGridSettings
+from estimators.grid.scan_grid import ScanGridSettings
+from estimators.memory.grid_memory import GridMemory, GridMemorySettings
+from estimators.registration.registration import ScanRegistration, SurfaceSource
+from estimators.registration.registration_settings import RegistrationSettings
 from tests.benchmarks.bench_estimators import FRAME_NS, hall, sensed_of
 
 FRAMES = 20

@@ -18,7 +18,7 @@ from estimators.calibration.gyro import calibrate_gyro
 from estimators.calibration.identify import Unknown, identify
 from estimators.calibration.loops import loops_of
 from estimators.calibration.wheels import calibrate_wheels, wheel_path
-from estimators.wheel_geometry import TwoSided
+from estimators.odometry.wheel_geometry import TwoSided
 from tests.estimators.scenes import MS, wheels
 
 OMNI = OmniThreeWheel.symmetric(wheel_radius_m=0.05, wheel_distance_m=0.1, first_bearing_rad=1.0)

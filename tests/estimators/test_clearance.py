@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from drivers.interface.seeds import stream
 from estimators.belief import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from estimators.clearance import ClearanceEstimator, ClearanceSettings, distance_to
-from estimators.rolling import lattice_around
+from estimators.memory.rolling import lattice_around
 
 CELL_M = 0.05
 FRAME_NS = 66_000_000

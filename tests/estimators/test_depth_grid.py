@@ -12,7 +12,7 @@ from drivers.interface.geometry import SE2, SE3
 from drivers.interface.samples import Intrinsics, frozen_array
 from drivers.interface.seeds import stream
 from estimators.belief import FREE, OCCUPIED, UNKNOWN
-from estimators.depth_grid import DepthGrid, DepthGridSettings, is_sound
+from estimators.grid.depth_grid import DepthGrid, DepthGridSettings, is_sound
 from tests.estimators.label_reference import labels
 from tests.estimators.scenes import SMALL, Floor, Pillar, Wall, frame, level_camera
 

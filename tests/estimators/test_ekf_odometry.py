@@ -17,8 +17,8 @@ from drivers.interface.kinematics import OmniThreeWheel, SkidSteer
 from drivers.interface.samples import ImuSample, PoseSample, Stamp, WheelSample
 from drivers.interface.seeds import stream
 from estimators.belief import EstimatorFault
-from estimators.ekf_model import STATES, Inertial, moved, transition
-from estimators.odometry_choice import OdometrySettings, build_odometry
+from estimators.odometry.ekf_model import STATES, Inertial, moved, transition
+from estimators.odometry.odometry_choice import OdometrySettings, build_odometry
 from tests.estimators.scenes import MS, sensed, wheels
 
 OMNI = OmniThreeWheel.symmetric(wheel_radius_m=0.05, wheel_distance_m=0.1)

@@ -8,10 +8,10 @@ from drivers.interface.geometry import SE2
 from drivers.interface.seeds import stream
 from estimators.belief import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from estimators.clearance import ClearanceEstimator, ClearanceSettings
-from estimators.field_memory import FieldMemory, FieldMemorySettings
-from estimators.grid_memory import GridMemory, GridMemorySettings
-from estimators.labelling import FrameLabels
-from estimators.rolling import lattice_around
+from estimators.grid.labelling import FrameLabels
+from estimators.memory.field_memory import FieldMemory, FieldMemorySettings
+from estimators.memory.grid_memory import GridMemory, GridMemorySettings
+from estimators.memory.rolling import lattice_around
 from tests.estimators.scenes import MS, ORIGIN
 
 CELL_M, WINDOW_M, RADIUS_M = 0.05, 3.0, 0.12

@@ -9,9 +9,9 @@ from pydantic import ValidationError
 from drivers.interface.geometry import SE2
 from drivers.interface.seeds import stream
 from estimators.belief import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
-from estimators.depth_grid import DepthGrid, DepthGridSettings
-from estimators.grid_filter import GridFilter, GridFilterSettings
-from estimators.labelling import FrameLabels, lattice_in_reach
+from estimators.grid.depth_grid import DepthGrid, DepthGridSettings
+from estimators.grid.grid_filter import GridFilter, GridFilterSettings
+from estimators.grid.labelling import FrameLabels, lattice_in_reach
 from tests.estimators.scenes import MS, Floor, Pillar, Wall, frame
 
 CELL_M = 0.05

@@ -5,9 +5,9 @@ import pytest
 
 from drivers.interface.geometry import SE2
 from estimators.belief import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
-from estimators.grid_memory import GridMemory, GridMemorySettings
-from estimators.labelling import FrameLabels
-from estimators.rolling import lattice_around, transfer
+from estimators.grid.labelling import FrameLabels
+from estimators.memory.grid_memory import GridMemory, GridMemorySettings
+from estimators.memory.rolling import lattice_around, transfer
 from tests.estimators.scenes import MS, ORIGIN
 
 CELL_M = 0.05

@@ -9,9 +9,9 @@ import pytest
 from drivers.interface.geometry import BODY_FROM_OPTICAL, SE2, SE3
 from drivers.interface.samples import Intrinsics, MarkerSample, Stamp
 from drivers.interface.seeds import stream
-from estimators.marker_pose import marker_pose
-from estimators.marker_settings import MarkerSettings
-from estimators.marker_tracking import MarkerTracker
+from estimators.tracks.marker_pose import marker_pose
+from estimators.tracks.marker_settings import MarkerSettings
+from estimators.tracks.marker_tracking import MarkerTracker
 
 K = Intrinsics(848, 480, 434.27, 434.27, 431.77, 240.45)
 SIDE_M, MS = 0.1, 1_000_000

@@ -10,9 +10,9 @@ from drivers.interface.geometry import SE2
 from drivers.interface.seeds import stream
 from estimators.belief import FREE, OCCUPIED
 from estimators.clearance import ClearanceEstimator, ClearanceSettings
-from estimators.depth_grid import DepthGrid, DepthGridSettings
-from estimators.grid_filter import GridFilter, GridFilterSettings
-from estimators.memory import MemorySettings, memory_of
+from estimators.grid.depth_grid import DepthGrid, DepthGridSettings
+from estimators.grid.grid_filter import GridFilter, GridFilterSettings
+from estimators.memory.memory import MemorySettings, memory_of
 from tests.estimators.scenes import MS, Floor, Pillar, Wall, frame
 
 CELL_M, RADIUS_M, FRAME_NS, LEAST_M = 0.05, 0.12, 66 * MS, 0.4

@@ -11,9 +11,9 @@ from drivers.interface.geometry import SE2
 from drivers.interface.kinematics import OmniThreeWheel, SkidSteer
 from drivers.interface.samples import ImuSample, PoseSample, Stamp, TruthSample
 from estimators.belief import EstimatorFault
-from estimators.dead_reckoning import DeadReckoning, DeadReckoningSettings
-from estimators.odometry import PoseTrail
-from estimators.truth_odometry import TruthOdometry
+from estimators.odometry.dead_reckoning import DeadReckoning, DeadReckoningSettings
+from estimators.odometry.odometry import PoseTrail
+from estimators.odometry.truth_odometry import TruthOdometry
 from tests.estimators.scenes import MS, sensed, wheels
 
 OMNI = OmniThreeWheel.symmetric(wheel_radius_m=0.05, wheel_distance_m=0.1)

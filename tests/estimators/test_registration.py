@@ -11,12 +11,12 @@ from drivers.interface.kinematics import OmniThreeWheel
 from drivers.interface.samples import RangeScan, Stamp
 from drivers.interface.seeds import stream
 from estimators.belief import EstimatorFault
-from estimators.depth_grid import DepthGridSettings
 from estimators.estimator import EstimatorSetup
-from estimators.registration import ScanRegistration, SurfaceSource
-from estimators.registration_settings import RegistrationSettings
-from estimators.scan_grid import ScanGridSettings
-from estimators.slab_points import points_of_depth, points_of_scan
+from estimators.grid.depth_grid import DepthGridSettings
+from estimators.grid.scan_grid import ScanGridSettings
+from estimators.registration.registration import ScanRegistration, SurfaceSource
+from estimators.registration.registration_settings import RegistrationSettings
+from estimators.registration.slab_points import points_of_depth, points_of_scan
 from estimators.standard import StandardEstimator, StandardSettings
 from tests.estimators.scenes import MS, ORIGIN, SMALL, Floor, Pillar, Wall, frame, level_camera, sensed, wheels
 

@@ -8,7 +8,7 @@ import numpy as np
 from drivers.interface.geometry import SE2
 from drivers.interface.samples import RangeScan, Stamp
 from estimators.belief import FREE, OCCUPIED, UNKNOWN
-from estimators.scan_grid import ScanGrid, ScanGridSettings, is_sound
+from estimators.grid.scan_grid import ScanGrid, ScanGridSettings, is_sound
 
 BEAMS = 360
 ANGLES = -math.pi + np.arange(BEAMS) * (2.0 * math.pi / BEAMS)

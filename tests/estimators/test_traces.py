@@ -6,8 +6,8 @@ import pytest
 
 from drivers.interface.seeds import stream
 from estimators.belief import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
-from estimators.rolling import lattice_around
-from estimators.traces import Traces
+from estimators.memory.rolling import lattice_around
+from estimators.tracks.traces import Traces
 
 FRAME_NS = 66_000_000
 SIDE = 120

@@ -8,15 +8,15 @@ import pytest
 from drivers.interface.geometry import SE2
 from drivers.interface.seeds import stream
 from estimators.belief import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
-from estimators.constant_velocity import ConstantVelocity, Motion, corrected, squared_distances
-from estimators.depth_grid import DepthGrid, DepthGridSettings
-from estimators.labelling import FrameLabels
-from estimators.memory import MemorySettings, memory_of
-from estimators.remembered import Remembered
-from estimators.rolling import lattice_around
-from estimators.segmentation import Disc, Surfaces, centred, segments, surfaces_of
-from estimators.traces import Traces
-from estimators.tracking import GridTracker, TrackingSettings
+from estimators.grid.depth_grid import DepthGrid, DepthGridSettings
+from estimators.grid.labelling import FrameLabels
+from estimators.memory.memory import MemorySettings, memory_of
+from estimators.memory.remembered import Remembered
+from estimators.memory.rolling import lattice_around
+from estimators.tracks.constant_velocity import ConstantVelocity, Motion, corrected, squared_distances
+from estimators.tracks.segmentation import Disc, Surfaces, centred, segments, surfaces_of
+from estimators.tracks.traces import Traces
+from estimators.tracks.tracking import GridTracker, TrackingSettings
 from tests.estimators.scenes import MS, Floor, Pillar, Wall, frame
 
 CELL_M, RADIUS_M = 0.05, 0.12

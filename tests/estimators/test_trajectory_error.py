@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from drivers.interface.geometry import SE2
 from drivers.interface.seeds import stream
-from estimators.trajectory_error import absolute_error_m, aligned, relative_error_m
+from estimators.odometry.trajectory_error import absolute_error_m, aligned, relative_error_m
 
 TRUTH = np.cumsum(stream(0, "walk").standard_normal((60, 2)), axis=0)
 

@@ -9,7 +9,7 @@ from drivers.interface.devices import DeviceSetup
 from drivers.interface.errors import ConfigurationError
 from drivers.interface.geometry import SE2, SE3
 from drivers.interface.samples import MarkerSample
-from estimators.marker_pose import marker_pose
+from estimators.tracks.marker_pose import marker_pose
 from sim_drivers.marker_camera import MarkerCameraSettings, SimMarkerCamera
 from sim_drivers.scene import MarkerPlate, Mover, Scene, Shape, StaticObstacle
 from sim_drivers.world import MujocoWorld, WorldSettings

@@ -13,14 +13,14 @@ from drivers.interface.samples import BaseSample, PoseSample, frozen_array
 from drivers.interface.sensed import Sensed
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import EstimatorFault
-from estimators.ekf_filter import MotionFilter, Sample
-from estimators.ekf_history import History
-from estimators.ekf_model import GYRO_BIAS, POSE
-from estimators.ekf_samples import pack_samples, unpack_samples
-from estimators.ekf_settings import EkfSettings
-from estimators.ekf_state import EkfState
-from estimators.odometry import SECOND_NS, OdometryEstimate, PoseTrail, latest_valid_ns
-from estimators.odometry_limits import MotionLimits
+from estimators.odometry.ekf_filter import MotionFilter, Sample
+from estimators.odometry.ekf_history import History
+from estimators.odometry.ekf_model import GYRO_BIAS, POSE
+from estimators.odometry.ekf_samples import pack_samples, unpack_samples
+from estimators.odometry.ekf_settings import EkfSettings
+from estimators.odometry.ekf_state import EkfState
+from estimators.odometry.odometry import SECOND_NS, OdometryEstimate, PoseTrail, latest_valid_ns
+from estimators.odometry.odometry_limits import MotionLimits
 
 
 class EkfOdometry:

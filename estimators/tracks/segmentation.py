@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from drivers.interface.samples import frozen_array
 from estimators.belief import F64, OCCUPIED, U8, Lattice, Mask, OccupancyGrid
-from estimators.labelling import FrameLabels
-from estimators.remembered import Remembered
-from estimators.rolling import transfer
-from estimators.traces import Traces
-from estimators.tracking_kernels import apparent_disc, centre_of
+from estimators.grid.labelling import FrameLabels
+from estimators.memory.remembered import Remembered
+from estimators.memory.rolling import transfer
+from estimators.tracks.traces import Traces
+from estimators.tracks.tracking_kernels import apparent_disc, centre_of
 
 STATIC_SHARE = 0.5  # of a connected surface; from here on the rest is taken for a part of the same wall
 NEIGHBOURS = np.ones((3, 3), dtype=np.uint8)

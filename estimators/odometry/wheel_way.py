@@ -10,7 +10,7 @@ from numba import njit
 from drivers.interface.kinematics import WheelKinematics
 from drivers.interface.samples import WheelSample
 from estimators.belief import F64
-from estimators.ekf_settings import EkfSettings
+from estimators.odometry.ekf_settings import EkfSettings
 
 LEAST = 1e-12  # m^2, rad^2: a base that cannot strafe counts nothing sideways at rest, and yet it is no certainty
 PARALLEL = 1e-9  # rad: an arc that turns less is a straight line

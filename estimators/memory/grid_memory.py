@@ -18,10 +18,10 @@ from drivers.interface.samples import frozen_array
 from drivers.interface.settings import Settings
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import OCCUPIED, UNKNOWN, Lattice, OccupancyGrid
-from estimators.labelling import FrameLabels
-from estimators.memory_kernels import fold, free_disc, in_the_open
-from estimators.remembered import Remembered
-from estimators.rolling import lattice_around, strays, transfer
+from estimators.grid.labelling import FrameLabels
+from estimators.memory.memory_kernels import fold, free_disc, in_the_open
+from estimators.memory.remembered import Remembered
+from estimators.memory.rolling import lattice_around, strays, transfer
 
 NEVER_NS = -(2**62)
 SECOND_NS = 1_000_000_000

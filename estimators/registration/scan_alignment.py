@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from drivers.interface.geometry import wrap_angle
 from estimators.belief import F64
-from estimators.reference_lines import ReferenceLines
-from estimators.registration_kernels import match_points, normal_equations
-from estimators.registration_settings import RegistrationSettings
-from estimators.straight_pieces import StraightPieces
+from estimators.registration.reference_lines import ReferenceLines
+from estimators.registration.registration_kernels import match_points, normal_equations
+from estimators.registration.registration_settings import RegistrationSettings
+from estimators.registration.straight_pieces import StraightPieces
 
 SETTLED = 1e-5  # a step so small [m, rad] ends the iterations
 NO_SPREAD = np.zeros((3, 3))

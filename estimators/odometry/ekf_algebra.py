@@ -9,8 +9,8 @@ from filterpy.kalman import ExtendedKalmanFilter, KalmanFilter
 from numba import njit
 
 from estimators.belief import F64
-from estimators.ekf_model import STATES
-from estimators.ekf_state import EkfState
+from estimators.odometry.ekf_model import STATES
+from estimators.odometry.ekf_state import EkfState
 
 _IDENTITY = np.eye(STATES)
 

@@ -1,7 +1,7 @@
 """Tracks of fiducial markers: a marker's number is the track's identity, so nothing has to be assigned.
 
-Each sighting gives a position with a covariance (`estimators.marker_pose`), which corrects a motion of constant velocity
-(`estimators.constant_velocity`) in odom.  Unseen, a track coasts, ever less certain, and dies.
+Each sighting gives a position with a covariance (`estimators.tracks.marker_pose`), which corrects a motion of constant velocity
+(`estimators.tracks.constant_velocity`) in odom.  Unseen, a track coasts, ever less certain, and dies.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from drivers.interface.geometry import SE2
 from drivers.interface.samples import MarkerSample, frozen_array
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import F64, Track
-from estimators.constant_velocity import ConstantVelocity, Motion, corrected, squared_distance
-from estimators.marker_pose import marker_pose
-from estimators.marker_settings import MarkerSettings
+from estimators.tracks.constant_velocity import ConstantVelocity, Motion, corrected, squared_distance
+from estimators.tracks.marker_pose import marker_pose
+from estimators.tracks.marker_settings import MarkerSettings
 
 SECOND_NS = 1_000_000_000
 

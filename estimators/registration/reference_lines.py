@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import F64, Mask
-from estimators.straight_pieces import StraightPieces
+from estimators.registration.straight_pieces import StraightPieces
 
 KNOWN_SHARE = 0.5  # of a piece's points on one line: it is a part of that
 NEW_SHARE = 0.1  # of them on any line at most: it is a line of its own

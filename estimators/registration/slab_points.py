@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from drivers.interface.samples import DepthFrame, RangeScan
 from estimators.belief import F64
-from estimators.depth_grid import SATURATED, DepthGridSettings
+from estimators.grid.depth_grid import SATURATED, DepthGridSettings
 
 RETURNS_MIN = 3  # of a sector, or it says nothing
 NEAR_MEDIAN = 0.03  # share of the median range within which a return belongs to the same surface

@@ -15,7 +15,7 @@ from drivers.interface.samples import RangeScan, Stamp, frozen_array
 from drivers.interface.sensed import Sensed
 from drivers.interface.settings import Settings
 from estimators.belief import F64, U8
-from estimators.labelling import FrameLabels, label_frame, lattice_in_reach
+from estimators.grid.labelling import FrameLabels, label_frame, lattice_in_reach
 
 
 class ScanGridSettings(Settings):

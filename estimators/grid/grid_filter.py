@@ -21,8 +21,8 @@ from drivers.interface.samples import frozen_array
 from drivers.interface.settings import Settings
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import F32, OCCUPIED, U8, UNKNOWN, Lattice, Mask, OccupancyGrid
-from estimators.labelling import FrameLabels
-from estimators.rolling import transfer
+from estimators.grid.labelling import FrameLabels
+from estimators.memory.rolling import transfer
 
 PAPER_FRAME_NS = 1_000_000_000 / 30
 NEVER_NS = -(2**62)

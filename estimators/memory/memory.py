@@ -10,10 +10,10 @@ from drivers.interface.geometry import SE2
 from drivers.interface.settings import Settings
 from drivers.interface.stateful import Stateful
 from estimators.belief import OccupancyGrid
-from estimators.field_memory import FieldMemory, FieldMemorySettings
-from estimators.grid_memory import GridMemory, GridMemorySettings
-from estimators.labelling import FrameLabels
-from estimators.remembered import Remembered
+from estimators.grid.labelling import FrameLabels
+from estimators.memory.field_memory import FieldMemory, FieldMemorySettings
+from estimators.memory.grid_memory import GridMemory, GridMemorySettings
+from estimators.memory.remembered import Remembered
 
 
 class Memory(Stateful, Protocol):

@@ -6,8 +6,8 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterable
 
 from drivers.interface.samples import ImuSample, WheelSample
-from estimators.ekf_filter import MotionFilter, Sample
-from estimators.ekf_state import EkfState
+from estimators.odometry.ekf_filter import MotionFilter, Sample
+from estimators.odometry.ekf_state import EkfState
 
 Key = tuple[int, int]  # capture time [ns], kind: what is sorted by; no two samples share one
 

@@ -24,9 +24,9 @@ from drivers.interface.samples import DepthFrame, Intrinsics, Stamp, frozen_arra
 from drivers.interface.sensed import Sensed
 from drivers.interface.settings import Settings
 from estimators.belief import F64, U8, Mask
-from estimators.depth_kernels import collect_depth, outline_blind
-from estimators.grid_filter import GridFilterSettings
-from estimators.labelling import FrameLabels, label_frame, lattice_in_reach
+from estimators.grid.depth_kernels import collect_depth, outline_blind
+from estimators.grid.grid_filter import GridFilterSettings
+from estimators.grid.labelling import FrameLabels, label_frame, lattice_in_reach
 
 SATURATED = 65_535  # what an overflowing depth value is clipped to; not a measurement
 

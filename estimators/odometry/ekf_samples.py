@@ -11,7 +11,7 @@ from drivers.interface.geometry import SE2
 from drivers.interface.samples import ImuSample, PoseSample, Stamp, WheelSample, frozen_array
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import F64
-from estimators.ekf_filter import Sample
+from estimators.odometry.ekf_filter import Sample
 
 _IMU, _WHEELS, _POSE = range(3)
 

@@ -7,11 +7,11 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from drivers.interface.kinematics import WheelKinematics
-from estimators.dead_reckoning import DeadReckoning, DeadReckoningSettings
-from estimators.ekf_settings import EkfSettings
-from estimators.odometry import Odometry
-from estimators.odometry_limits import MotionLimits
-from estimators.wheel_geometry import OmniGeometry, SkidSteerGeometry
+from estimators.odometry.dead_reckoning import DeadReckoning, DeadReckoningSettings
+from estimators.odometry.ekf_settings import EkfSettings
+from estimators.odometry.odometry import Odometry
+from estimators.odometry.odometry_limits import MotionLimits
+from estimators.odometry.wheel_geometry import OmniGeometry, SkidSteerGeometry
 
 Geometry = Annotated[OmniGeometry | SkidSteerGeometry, Field(discriminator="kind")]
 
@@ -40,7 +40,7 @@ def build_odometry(
         kinematics = settings.geometry.kinematics
     if settings.kind == "dead_reckoning":
         return DeadReckoning(settings, kinematics)
-    from estimators.ekf_odometry import EkfOdometry  # noqa: PLC0415 - FilterPy brings 40 MB that only those who filter need carry
+    from estimators.odometry.ekf_odometry import EkfOdometry  # noqa: PLC0415 - FilterPy brings 40 MB that only those who filter need carry
 
     limits = MotionLimits(
         settings.speed_max_m_s,

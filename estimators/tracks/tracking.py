@@ -1,7 +1,7 @@
 """Moving obstacles without classes: discs that no static wall explains, followed from frame to frame in odom.
 
-Components of cells become discs (`estimators.segmentation`), discs are given to tracks by the assignment of least total
-distance, tracks move at constant velocity (`estimators.constant_velocity`).  A track is given out once it was seen often
+Components of cells become discs (`estimators.tracks.segmentation`), discs are given to tracks by the assignment of least total
+distance, tracks move at constant velocity (`estimators.tracks.constant_velocity`).  A track is given out once it was seen often
 enough.  Out of sight it coasts; where its place is seen to be free it soon ends.  What stands still long enough to count as
 static is the grid's business and no longer a track's.
 
@@ -18,14 +18,14 @@ from scipy.optimize import linear_sum_assignment
 
 from drivers.interface.samples import frozen_array
 from drivers.interface.stateful import pack, unpack
-from estimators import segmentation
 from estimators.belief import F64, FREE, Lattice, OccupancyGrid, Track
-from estimators.constant_velocity import PLANE, ConstantVelocity, Motion, corrected, squared_distances
-from estimators.labelling import FrameLabels
-from estimators.remembered import Remembered
-from estimators.segmentation import Disc, Segment, centred, segments, surfaces_of
-from estimators.traces import Traces
-from estimators.tracking_settings import TrackingSettings
+from estimators.grid.labelling import FrameLabels
+from estimators.memory.remembered import Remembered
+from estimators.tracks import segmentation
+from estimators.tracks.constant_velocity import PLANE, ConstantVelocity, Motion, corrected, squared_distances
+from estimators.tracks.segmentation import Disc, Segment, centred, segments, surfaces_of
+from estimators.tracks.traces import Traces
+from estimators.tracks.tracking_settings import TrackingSettings
 
 SECOND_NS = 1_000_000_000
 BEYOND = 1e6  # the cost of what is outside the gate

@@ -19,7 +19,7 @@ from drivers.interface.sensed import Sensed
 from drivers.interface.settings import Settings
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import F64, EstimatorFault
-from estimators.odometry import SECOND_NS, STAMP_SLACK_S, OdometryEstimate, PoseTrail, is_plausible, latest_valid_ns
+from estimators.odometry.odometry import SECOND_NS, STAMP_SLACK_S, OdometryEstimate, PoseTrail, is_plausible, latest_valid_ns
 
 GYRO_SAMPLES_MAX = 1024  # kept while no wheel sample comes that could use them
 

@@ -10,7 +10,7 @@ from drivers.interface.geometry import SE2
 from drivers.interface.samples import TruthSample, frozen_array
 from drivers.interface.sensed import Sensed
 from estimators.belief import EstimatorFault
-from estimators.odometry import OdometryEstimate, PoseTrail, latest_valid_ns
+from estimators.odometry.odometry import OdometryEstimate, PoseTrail, latest_valid_ns
 
 
 class TruthOdometry:

@@ -14,8 +14,8 @@ from drivers.interface.geometry import SE2
 from drivers.interface.samples import Stamp, frozen_array
 from drivers.interface.sensed import Sensed
 from estimators.belief import U8, Lattice, Mask, OccupancyGrid
-from estimators.label_kernels import label_cells
-from estimators.rolling import lattice_around
+from estimators.grid.label_kernels import label_cells
+from estimators.memory.rolling import lattice_around
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import F64, OCCUPIED, Lattice, Mask, OccupancyGrid
-from estimators.rolling import transfer
-from estimators.tracking_kernels import count_left, keep_times
+from estimators.memory.rolling import transfer
+from estimators.tracks.tracking_kernels import count_left, keep_times
 
 NEVER_NS = -(2**62)
 SPAN_NS = 1_000_000_000  # how long ago ground may have been left

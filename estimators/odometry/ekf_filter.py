@@ -9,13 +9,13 @@ import numpy as np
 from drivers.interface.geometry import wrap_angle
 from drivers.interface.kinematics import WheelKinematics
 from drivers.interface.samples import ImuSample, PoseSample, WheelSample
-from estimators.ekf_algebra import Algebra, squared_surprise
-from estimators.ekf_model import BIASES, GYRO_BIAS, POSE, STATES, VELOCITY, VX, WAY, YAW, transition, without_way
-from estimators.ekf_settings import EkfSettings
-from estimators.ekf_state import EkfState
-from estimators.odometry import SECOND_NS, STAMP_SLACK_S
-from estimators.odometry_limits import MotionLimits
-from estimators.wheel_way import WheelModel, WheelWay, farthest
+from estimators.odometry.ekf_algebra import Algebra, squared_surprise
+from estimators.odometry.ekf_model import BIASES, GYRO_BIAS, POSE, STATES, VELOCITY, VX, WAY, YAW, transition, without_way
+from estimators.odometry.ekf_settings import EkfSettings
+from estimators.odometry.ekf_state import EkfState
+from estimators.odometry.odometry import SECOND_NS, STAMP_SLACK_S
+from estimators.odometry.odometry_limits import MotionLimits
+from estimators.odometry.wheel_way import WheelModel, WheelWay, farthest
 
 Sample = ImuSample | WheelSample | PoseSample
 VELOCITY_STD_M_S = 0.5  # of a velocity of which nothing is known

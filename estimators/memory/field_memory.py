@@ -28,11 +28,11 @@ from drivers.interface.samples import frozen_array
 from drivers.interface.settings import Settings
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import OCCUPIED, UNKNOWN, Lattice, Mask, OccupancyGrid
-from estimators.field_memory_kernels import fold_layers
-from estimators.labelling import FrameLabels
-from estimators.memory_kernels import free_disc, in_the_open
-from estimators.remembered import Remembered
-from estimators.rolling import cells_between, lattice_around, strays, transfer
+from estimators.grid.labelling import FrameLabels
+from estimators.memory.field_memory_kernels import fold_layers
+from estimators.memory.memory_kernels import free_disc, in_the_open
+from estimators.memory.remembered import Remembered
+from estimators.memory.rolling import cells_between, lattice_around, strays, transfer
 
 NEVER_NS = -(2**62)
 STEP_NS = 200_000_000  # the period that the paper's retentions are meant for

@@ -3,10 +3,10 @@
 What the frames are registered against.  The grid memory lies in odom and drifts with it: a frame laid on it can only agree
 with the odometry that put it there.  So it decides here what is static (points on what came to stand where it was free take no
 part), and the reference is apart from it, in map: straight pieces of the static surface, as lines that hold the moments of
-their points (`estimators.reference_lines`).  A wall keeps the direction and the place that the first, well-known poses gave it,
-however long it is; later frames are laid on it before their points are taken in, so that they make it longer but do not turn
-it.  Key scans chained one to the next would let the heading walk at random with each link.  Curved and small things are not
-straight for `piece_min_m` and say nothing, a walker among them.
+their points (`estimators.registration.reference_lines`).  A wall keeps the direction and the place that the first, well-known
+poses gave it, however long it is; later frames are laid on it before their points are taken in, so that they make it longer
+but do not turn it.  Key scans chained one to the next would let the heading walk at random with each link.  Curved and small
+things are not straight for `piece_min_m` and say nothing, a walker among them.
 
 How.  Gauss-Newton on SE(2) for the pose of base in map at the frame's capture, of the weighted squared distances from points to
 lines (point-to-line ICP: Censi, An ICP variant using a point-to-line metric, ICRA 2008) with Cauchy's weights, plus the
@@ -33,14 +33,14 @@ from drivers.interface.samples import DepthFrame, Intrinsics, Stamp, frozen_arra
 from drivers.interface.sensed import Sensed
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import F64, Registration
-from estimators.depth_grid import DepthGridSettings
-from estimators.reference_lines import ReferenceLines, Sighting
-from estimators.registration_settings import RegistrationSettings
-from estimators.remembered import Remembered
-from estimators.scan_alignment import Alignment, Expected, align
-from estimators.scan_grid import ScanGridSettings
-from estimators.slab_points import points_of_depth, points_of_scan
-from estimators.straight_pieces import straight_pieces
+from estimators.grid.depth_grid import DepthGridSettings
+from estimators.grid.scan_grid import ScanGridSettings
+from estimators.memory.remembered import Remembered
+from estimators.registration.reference_lines import ReferenceLines, Sighting
+from estimators.registration.registration_settings import RegistrationSettings
+from estimators.registration.scan_alignment import Alignment, Expected, align
+from estimators.registration.slab_points import points_of_depth, points_of_scan
+from estimators.registration.straight_pieces import straight_pieces
 
 START_STD = np.array([1e-3, 1e-3, 1e-3])  # m, m, rad: the map is where the robot says that it starts
 

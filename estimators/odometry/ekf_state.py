@@ -9,7 +9,7 @@ import numpy as np
 from drivers.interface.geometry import SE2, wrap_angle
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import F64
-from estimators.ekf_model import STATES, VX, VY, YAW, X, Y
+from estimators.odometry.ekf_model import STATES, VX, VY, YAW, X, Y
 
 _NEVER = -(2**63)
 

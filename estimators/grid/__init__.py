@@ -1,0 +1,1 @@
+"""From one frame of a range sensor to labelled cells."""

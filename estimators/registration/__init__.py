@@ -1,0 +1,1 @@
+"""Frames against the straight walls seen before."""

@@ -1,0 +1,1 @@
+"""What moves: discs followed from frame to frame, fiducial markers, or the truth."""
