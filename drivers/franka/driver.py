@@ -52,6 +52,7 @@ class FrankaArm(WireDevice):
             settings,
             MEMORY,
             open_s=settings.open_timeout_s,
+            place=f"the arm at {settings.host}",
             silent_s=LONGEST_REQUEST_S,
         )
         super().__init__(setup, spec, "joints", settings.decimation * 1_000_000)

@@ -38,6 +38,7 @@ class IoSpec:
     wire: BackoffSettings = field(default_factory=BackoffSettings)  # for a lost wire; the same process tries again
     restart: BackoffSettings = field(default_factory=lambda: BackoffSettings(tries=5))  # for a dead or stuck process
     open_s: float = 10.0  # how long connecting may take
+    place: str = ""  # where the device should answer, for the message that it did not
     silent_s: float = 1.0  # a process that has not gone round its loop for so long is stuck, and is killed
 
 
@@ -154,7 +155,8 @@ class IoProcess:
                 return
             late = time.monotonic() > deadline_s
             if word is not None or record.reconnects or record.state is DeviceState.FAULTED or late:
-                fault = (word[1] if word else record.fault) or f"it did not connect within {spec.open_s:g} s"
+                nobody = f"{spec.place or 'it'} did not answer within {spec.open_s:g} s"
+                fault = (word[1] if word else record.fault) or nobody
                 raise DeviceError(fault if fault.startswith(spec.name) else f"{spec.name}: {fault}")
             time.sleep(0.002)
 

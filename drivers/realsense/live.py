@@ -23,9 +23,11 @@ class LiveSource:
         self._context = rs.context()
         found = {each.get_info(rs.camera_info.serial_number): each for each in self._context.query_devices()}
         names = [f"{each.get_info(rs.camera_info.name)} {serial}" for serial, each in found.items()]
-        told = f"connected: {', '.join(names)}" if names else "none is connected"
+        told = f"connected: {', '.join(names) or 'none'}"
         if serial_number and serial_number not in found:
             raise DeviceError(f"{device}: there is no RealSense camera with serial number {serial_number}; {told}")
+        if not found:
+            raise DeviceError(f"{device}: no RealSense camera is connected")
         if not serial_number and len(found) != 1:
             raise DeviceError(f"{device}: serial_number must say which RealSense camera it is; {told}")
         self._device = found[serial_number or next(iter(found))]

@@ -27,8 +27,8 @@ from drivers.interface.settings import Settings
 from runtime import configuration
 from runtime.cycle import Cycle
 from runtime.faults import Response
-from runtime.log.paths import files_of
-from runtime.log.read import ticks
+from runtime.log.files.paths import files_of
+from runtime.log.reading.read import ticks
 from runtime.run import RunOptions, RunResult, run
 from tests.faults.emulated import EmulatedRobot, emulated
 

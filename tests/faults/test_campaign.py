@@ -5,7 +5,7 @@ import pytest
 from drivers.interface.errors import ConfigurationError
 from runtime import configuration
 from runtime.assembly import assemble
-from runtime.log.read import same_content
+from runtime.log.reading.read import same_content
 from tests.faults.campaign import Script, findings, scripts, simulated
 
 SHORT = {"changes": ("mission.goals=[{x_m: 0.8, y_m: 0.0}]", "mission.time_limit_s=6"), "at_s": 0.5, "for_s": 0.6}
