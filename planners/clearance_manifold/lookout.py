@@ -83,12 +83,11 @@ class Lookout:
                 continue
             if begin < 0.0 and self._committed:
                 continue
-            if begin < LOOK_M:
-                self._waited_s += period_s if speed_m_s < s.creep_m_s + 0.05 else 0.0
-                look_at = self._look_at(when, whence, at, normal, begin, end)
-            else:
-                look_at = None
-            if begin < -2.0 * self._apart_m:  # nothing seen beside it tells where to wait: it goes on, slowly
+            creeps = begin < -2.0 * self._apart_m  # nothing seen beside it tells where to wait: it goes on, slowly
+            look_at = self._look_at(when, whence, at, normal, begin, end) if begin < LOOK_M else None
+            if look_at is not None and speed_m_s < s.creep_m_s + 0.05:
+                self._waited_s += 2.0 * period_s if creeps else period_s
+            if creeps:
                 return Outlook(math.inf, s.creep_m_s, look_at, demand, True)
             return Outlook(max(begin, 0.0), math.inf, look_at, demand, True)
         if not len(found):
