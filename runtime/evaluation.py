@@ -63,12 +63,14 @@ def load_evaluation(name_or_path: str, seeds: int | None, changes: tuple[str, ..
     """
     from runtime.clearance_evaluation import ClearanceEvaluation  # noqa: PLC0415 - each kind knows this contract
     from runtime.experiment import RunsEvaluation  # noqa: PLC0415
+    from runtime.navigation_evaluation import NavigationEvaluation  # noqa: PLC0415
     from runtime.odometry_evaluation import OdometryEvaluation  # noqa: PLC0415
     from runtime.perception_evaluation import PerceptionEvaluation  # noqa: PLC0415
     from runtime.registration_evaluation import RegistrationEvaluation  # noqa: PLC0415
 
     kinds: dict[str, type[Evaluation]] = {
         "runs": RunsEvaluation,
+        "navigation": NavigationEvaluation,
         "clearance": ClearanceEvaluation,
         "odometry": OdometryEvaluation,
         "perception": PerceptionEvaluation,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from pydantic import Field
 
@@ -13,6 +14,9 @@ from runtime.evaluation import EvaluationTable
 from runtime.referee import Outcome
 from runtime.report import RunReport
 from runtime.side_by_side import side_by_side
+
+if TYPE_CHECKING:
+    from runtime.run import RunResult
 
 
 class Experiment(Settings):
@@ -49,11 +53,15 @@ def run_case(case: Case) -> RunReport:
     """Run one case in this process, without a recording."""
     from runtime import configuration, run  # noqa: PLC0415 - in the worker process, not in the one that hands out the work
 
-    result = run.run(configuration.load(case.configuration, case.overrides), run.RunOptions(seed=case.seed))
+    return report_of(run.run(configuration.load(case.configuration, case.overrides), run.RunOptions(seed=case.seed)))
+
+
+def report_of(result: RunResult) -> RunReport:
+    """Return the report of one run of many; what broke the run is raised, and Ctrl-C means all of them."""
     if result.failure is not None:
         raise result.failure
     if result.report.outcome == Outcome.INTERRUPTED.value:
-        raise KeyboardInterrupt  # Ctrl-C means the experiment, not one of its runs
+        raise KeyboardInterrupt
     return result.report
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TypeVar
 
-from pydantic import ValidationError
+from pydantic import ConfigDict, Field, ValidationError
 
 from drivers.interface.errors import ConfigurationError
 from drivers.interface.settings import Settings
@@ -57,3 +57,20 @@ def chosen_world(path: Path, worlds: Mapping[str, W], number: int | None) -> W:
     if str(number) not in worlds:
         raise ConfigurationError(f"{path}: there is no world {number} in it. Known: {known}")
     return worlds[str(number)]
+
+
+class _AnyWorlds(Settings):
+    """Any file of worlds by number, whatever else it holds."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    worlds: dict[int, object] = Field(min_length=1)
+
+
+def world_numbers(path: Path) -> tuple[int, ...]:
+    """Return the numbers of the worlds in a file, in order.
+
+    Raises:
+        ConfigurationError: it cannot be read, or holds no worlds.
+    """
+    return tuple(sorted(read_json(path, _AnyWorlds).worlds))
