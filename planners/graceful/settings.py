@@ -16,7 +16,7 @@ class GracefulSettings(Settings):
     k_delta: float = Field(1.0, gt=0.0, le=20.0, description="k_2: gain of the steering")
     beta: float = Field(0.4, ge=0.0, le=20.0, description="how much a curve slows it down")
     exponent: float = Field(2.0, ge=1.0, le=10.0, description="lambda: how sharply it does")
-    slowdown_radius_m: float = Field(1.5, gt=0.0, le=10.0, description="this near its target it slows down")
+    slowdown_radius_m: float = Field(0.75, gt=0.0, le=10.0, description="this near its target it slows down")
     min_lookahead_m: float = Field(0.25, gt=0.0, le=10.0, description="nearest target on the path, short of its end")
     max_lookahead_m: float = Field(1.0, gt=0.0, le=10.0, description="farthest target")
     initial_rotation: bool = Field(True, description="turn on the spot towards a target that lies aside")

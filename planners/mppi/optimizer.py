@@ -132,6 +132,8 @@ class Optimizer:
         self._draw()
 
     def _draw(self) -> None:
-        shape = self.controls.shape
-        normal = stream(self._seed, "mppi", self._draws).standard_normal(shape, np.float32)
-        self._noise = normal * self._std[:, None, None]
+        axes = np.flatnonzero(self._std)
+        shape = (len(axes), *self.controls.shape[1:])
+        self._noise = np.zeros(self.controls.shape, np.float32)
+        self._noise[axes] = stream(self._seed, "mppi", self._draws).standard_normal(shape, np.float32)
+        self._noise *= self._std[:, None, None]
