@@ -7,7 +7,7 @@ from itertools import count
 from pathlib import Path
 
 from drivers.interface.errors import ConfigurationError
-from runtime.log.paths import files_of, stem_of
+from runtime.log.files.paths import files_of, stem_of
 
 LOGS = Path("runs")
 

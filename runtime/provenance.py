@@ -8,8 +8,8 @@ from importlib import resources
 from drivers.interface.geometry import SE2, SE3
 from runtime.configuration import Choice, Configuration
 from runtime.doctor.findings import recent_examination
+from runtime.log.drawn.urdf import links_of
 from runtime.log.header import ArmShape, RunHeader, SceneShape, code_version, library_versions, machine
-from runtime.log.urdf import links_of
 from sim_drivers.scene import Scene, Shape
 
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from drivers.interface.errors import ConfigurationError
 from drivers.interface.geometry import wrap_angle
 from runtime.cycle import STAGES
-from runtime.log import plots, timing
-from runtime.log.read import Log, read
+from runtime.log.drawn import plots, timing
+from runtime.log.reading.read import Log, read
 
 F64 = NDArray[np.float64]
 _DEVICES = {  # entity of its samples

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from runtime.log.read import ticks
-from runtime.log.stream import rows
+from runtime.log.exact.stream import rows
+from runtime.log.reading.read import ticks
 
 
 def recorded_ticks(log: Path) -> tuple[int, ...]:

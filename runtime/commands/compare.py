@@ -21,7 +21,7 @@ def compare(
 ) -> None:
     """Compare two runs: latency, age, time, effort, odometry error and clearance."""
     from runtime import compare as comparing
-    from runtime.log.comparison import write_comparison
+    from runtime.log.drawn.comparison import write_comparison
 
     out = None if log is None else log_path(log, "compare", force=force)
     require_writable(json, "--json")

@@ -19,7 +19,7 @@ Output = Annotated[Path | None, typer.Option(help="where to write; default: besi
 @app.command()
 def info(log: LogFile) -> None:
     """Say where a recording comes from and what it holds."""
-    from runtime.log.isolated import described
+    from runtime.log.reading.isolated import described
 
     table = Table.grid(padding=(0, 2))
     for name, text in described(log).lines:
@@ -30,7 +30,7 @@ def info(log: LogFile) -> None:
 @app.command()
 def verify(log: LogFile) -> None:
     """Check that every tick is there and undamaged: 0 it is so, 1 not, 2 it cannot be read."""
-    from runtime.log.isolated import verified
+    from runtime.log.reading.isolated import verified
 
     found = verified(log)
     for sentence in found.findings:
@@ -44,8 +44,8 @@ def verify(log: LogFile) -> None:
 @app.command()
 def repair(log: LogFile, output: Output = None) -> None:
     """Save what can be read of a damaged recording to another one."""
-    from runtime.log.isolated import verified
-    from runtime.log.repair import repair as save
+    from runtime.log.reading.isolated import verified
+    from runtime.log.reading.repair import repair as save
 
     path = save(log, output)
     found = verified(path)
@@ -61,7 +61,7 @@ def cut(
     output: Output = None,
 ) -> None:
     """Write the seconds around a tick to a small recording that can be replayed by itself."""
-    from runtime.log.cut import cut as cut_out
+    from runtime.log.reading.cut import cut as cut_out
 
     path = cut_out(log, around, seconds, output)
     console.print(f"{path}: replay it with `trundle replay {path}`", soft_wrap=True)

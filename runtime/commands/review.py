@@ -17,6 +17,6 @@ def review(
     screenshot: Annotated[Path | None, typer.Option(help="write a picture instead of opening a window")] = None,
 ) -> None:
     """Open a recording in the Rerun viewer, on loopback only."""
-    from runtime.log import review as reviewing
+    from runtime.log.reading import review as reviewing
 
     reviewing.review(log, at, screenshot, None if question is None else reviewing.question_named(question))

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Literal
 
 from drivers.interface.geometry import SE2, SE3
-from runtime.log.urdf import Link
+from runtime.log.drawn.urdf import Link
 
 SCHEMA_VERSION = 5  # of the replay columns; raised when a reader of the old ones would misread the new
 READABLE_SCHEMAS = (SCHEMA_VERSION,)

@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 from runtime.cycle import Cycle
 from runtime.keyframes import KeyFrame
-from runtime.log.exact import warm_up
+from runtime.log.exact.part import warm_up
+from runtime.log.files.segments import Segments
 from runtime.log.header import RunHeader
-from runtime.log.incidents import bundle
-from runtime.log.segments import Segments
+from runtime.log.reading.incidents import bundle
 from runtime.log.settings import LogSettings
 
 _CLOSE_TIMEOUT_S = 10.0

@@ -11,20 +11,20 @@ import rerun.blueprint as rrb
 
 from runtime.cycle import Cycle
 from runtime.keyframes import KeyFrame
-from runtime.log import plots, scene, timing
-from runtime.log.columns import ArrowColumn, timelines
-from runtime.log.drawings import Drawings, planner_drawings, shield_drawings
-from runtime.log.events import Events
-from runtime.log.exact import ExactPart
+from runtime.log.drawn import plots, scene, timing
+from runtime.log.drawn.drawings import Drawings, planner_drawings, shield_drawings
+from runtime.log.drawn.events import Events
+from runtime.log.drawn.layout import layout
+from runtime.log.exact.columns import ArrowColumn, timelines
+from runtime.log.exact.keyframes import KeyFramePart
+from runtime.log.exact.packing import Layout
+from runtime.log.exact.part import ExactPart
+from runtime.log.files.live import LiveView
+from runtime.log.files.marks import END, SEGMENT, End, Segment
+from runtime.log.files.sink import Sink
 from runtime.log.header import SCHEMA_VERSION, RunHeader
-from runtime.log.keyframes import KeyFramePart
-from runtime.log.layout import layout
-from runtime.log.live import LiveView
-from runtime.log.marks import END, SEGMENT, End, Segment
-from runtime.log.opening import RUN
-from runtime.log.packing import Layout
+from runtime.log.reading.opening import RUN
 from runtime.log.settings import LogSettings
-from runtime.log.sink import Sink
 
 
 class Drawn(Protocol):

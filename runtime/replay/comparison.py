@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from runtime.cycle import Cycle
-from runtime.log.block import Row, Values
-from runtime.log.columns import Column, Kind
-from runtime.log.exact import decided_schemas
-from runtime.log.schema import Schema
+from runtime.log.exact.block import Row, Values
+from runtime.log.exact.columns import Column, Kind
+from runtime.log.exact.part import decided_schemas
+from runtime.log.exact.schema import Schema
 
 DIGEST = "crc32"  # the last part of the name of a checksum's column
 

@@ -7,14 +7,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from drivers.interface.errors import ConfigurationError
-from runtime.log.exact import CHECK
-from runtime.log.isolated import verified
-from runtime.log.opening import DamagedLogError, require_log, require_recording
-from runtime.log.paths import files_of
-from runtime.log.repair import repair
-from runtime.log.seal import Seal, seal_of
-from runtime.log.times import starts_ns
-from runtime.log.verification import Verification
+from runtime.log.exact.part import CHECK
+from runtime.log.exact.times import starts_ns
+from runtime.log.files.paths import files_of
+from runtime.log.files.seal import Seal, seal_of
+from runtime.log.reading.isolated import verified
+from runtime.log.reading.opening import DamagedLogError, require_log, require_recording
+from runtime.log.reading.repair import repair
+from runtime.log.reading.verification import Verification
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import rerun.blueprint as rrb
 
-from runtime.log import plots, scene, views
+from runtime.log.drawn import plots, scene, views
 from runtime.log.header import RunHeader
 
 RECORDED = "/view/recorded"  # what the recording holds of the same things

@@ -15,7 +15,7 @@ from estimators.belief import Belief
 from planners.planner import Plan
 from planners.router import Route
 from runtime.cycle import Cycle, Verdict
-from runtime.log.block import Row
+from runtime.log.exact.block import Row
 from runtime.loop import Stages
 
 

@@ -13,11 +13,11 @@ from drivers.interface.errors import ConfigurationError
 from runtime.assembly import draw_scene
 from runtime.configuration import Configuration
 from runtime.cycle import Cycle
-from runtime.log import colours, plots, scene
-from runtime.log.block import Row
+from runtime.log.drawn import colours, plots, scene
+from runtime.log.drawn.layers import IDENTICAL, Layer
+from runtime.log.exact.block import Row
+from runtime.log.files.sink import Sink
 from runtime.log.header import RunHeader
-from runtime.log.layers import IDENTICAL, Layer
-from runtime.log.sink import Sink
 from runtime.log.writer import Writer
 from runtime.provenance import run_header
 from runtime.replay.layout import RECORDED, RECORDED_PLAN, layout

@@ -13,13 +13,13 @@ from runtime.assembly import assemble_recorded
 from runtime.configuration import Configuration
 from runtime.cycle import Cycle
 from runtime.keyframes import KeyFrame
-from runtime.log.block import Row
-from runtime.log.exact import CHECK, warm_up
+from runtime.log.exact.block import Row
+from runtime.log.exact.keyframes import KEY_FRAME
+from runtime.log.exact.part import CHECK, warm_up
+from runtime.log.exact.stream import rows
+from runtime.log.exact.times import starts_ns
 from runtime.log.header import RunHeader, processor
-from runtime.log.keyframes import KEY_FRAME
-from runtime.log.origin import header_of
-from runtime.log.stream import rows
-from runtime.log.times import starts_ns
+from runtime.log.reading.origin import header_of
 from runtime.loop import run_loop
 from runtime.parts import Parts
 from runtime.replay.changes import configuration_of

@@ -11,7 +11,7 @@ from estimators.belief import Belief
 from planners.planner import Plan
 from runtime.fault_board import FaultBoard
 from runtime.faults import Fault, FaultReport
-from runtime.log.block import Row
+from runtime.log.exact.block import Row
 
 
 class RecordedRobot:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from runtime.log.block import Row
+from runtime.log.exact.block import Row
 
 
 class Stretches:

@@ -9,8 +9,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from drivers.interface.samples import Intrinsics
+from runtime.log.reading.repair import quiet_environment, rerun_program
 from runtime.log.recorder import Recorder
-from runtime.log.repair import quiet_environment, rerun_program
 from runtime.log.settings import LogSettings
 from tests.benchmarks.figure import Figure, of_distribution
 from tests.runtime.log_cycles import header, make_cycles

@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 
 from drivers.interface.samples import Intrinsics
 from runtime.cycle import Cycle
-from runtime.log import rvl
+from runtime.log.exact import rvl
 from runtime.log.recorder import Recorder
 from runtime.log.settings import LogSettings
 from runtime.log.writer import Writer

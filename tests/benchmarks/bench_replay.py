@@ -8,9 +8,9 @@ from drivers.interface.samples import Intrinsics
 from runtime import configuration, run
 from runtime.cycle import Cycle
 from runtime.keyframes import KeyFrames
-from runtime.log import rvl
+from runtime.log.exact import rvl
+from runtime.log.exact.stream import rows
 from runtime.log.settings import LogSettings
-from runtime.log.stream import rows
 from runtime.log.writer import Writer
 from runtime.replay.replay import ReplayOptions, replay
 from tests.benchmarks.figure import Figure

@@ -13,11 +13,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from drivers.interface.errors import ConfigurationError
-from runtime.log.paths import files_of
+from runtime.log.files.paths import files_of
+from runtime.log.reading.repair import repair
+from runtime.log.reading.verification import Verification, verify
 from runtime.log.recorder import Recorder
-from runtime.log.repair import repair
 from runtime.log.settings import LogSettings
-from runtime.log.verification import Verification, verify
 from tests.runtime.log_cycles import header, make_cycles
 
 PERIOD_NS = 20_000_000

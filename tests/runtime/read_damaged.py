@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from drivers.interface.errors import ConfigurationError
-from runtime.log.verification import verify
+from runtime.log.reading.verification import verify
 
 
 def said_of(path: Path) -> str:

@@ -17,7 +17,7 @@ from runtime import configuration, run
 from runtime.assembly import Assembly
 from runtime.cycle import Cycle
 from runtime.faults import Fault, Response
-from runtime.log import read
+from runtime.log.reading import read
 from runtime.report import RunReport
 from sim_drivers.arm_model import READY_RAD, panda_joint
 

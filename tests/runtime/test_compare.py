@@ -10,7 +10,7 @@ from drivers.interface.seeds import stream
 from runtime.cli import run_command
 from runtime.compare import block_medians, compare, compared, difference, summary
 from runtime.cycle import Cycle
-from runtime.log.opening import reader_of
+from runtime.log.reading.opening import reader_of
 from runtime.quantities import Quantity, quantities
 from tests.runtime.log_cycles import make_cycles
 from tests.runtime.test_log_recorder import record

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from runtime.interrupt import Interrupts, Phase, interruptible
-from runtime.log import read
+from runtime.log.reading import read
 
 COMMAND = "from runtime.cli import main; main()"
 

@@ -7,11 +7,11 @@ import pytest
 from drivers.interface.commands import JointTrajectory
 from drivers.interface.geometry import SE3
 from runtime import configuration
-from runtime.log import drawings, plots, scene, timing
-from runtime.log.arm import set_point
-from runtime.log.opening import reader_of
-from runtime.log.read import STATIC, Log, read
-from runtime.log.urdf import links_of
+from runtime.log.drawn import drawings, plots, scene, timing
+from runtime.log.drawn.arm import set_point
+from runtime.log.drawn.urdf import links_of
+from runtime.log.reading.opening import reader_of
+from runtime.log.reading.read import STATIC, Log, read
 from runtime.run import RunOptions, run
 
 DRIVE = ("dynamic_hallway", "planner.name=point_ds", "estimator.tracks=truth", "mission.time_limit_s=2.0")

@@ -10,11 +10,11 @@ import pyarrow as pa
 import rerun as rr
 import rerun.blueprint as rrb
 
-from runtime.log.columns import ArrowColumn, timelines
-from runtime.log.live import LiveView
+from runtime.log.exact.columns import ArrowColumn, timelines
+from runtime.log.files.live import LiveView
+from runtime.log.reading.repair import quiet_environment, rerun_program
+from runtime.log.reading.review import _free_port
 from runtime.log.recorder import Recorder
-from runtime.log.repair import quiet_environment, rerun_program
-from runtime.log.review import _free_port
 from runtime.log.settings import LogSettings
 from tests.runtime.log_cycles import header, make_cycles
 

@@ -11,14 +11,14 @@ import pytest
 
 from runtime.cli import run_command
 from runtime.faults import Fault, FaultReport, Response
-from runtime.log.cut import CUT
-from runtime.log.events import EVENTS
+from runtime.log.drawn.events import EVENTS
+from runtime.log.files.paths import files_of
+from runtime.log.files.stops import Stops
 from runtime.log.header import SCHEMA_VERSION
-from runtime.log.paths import files_of
-from runtime.log.read import STATIC, read
+from runtime.log.reading.cut import CUT
+from runtime.log.reading.read import STATIC, read
+from runtime.log.reading.verification import verify
 from runtime.log.settings import LogSettings
-from runtime.log.stops import Stops
-from runtime.log.verification import verify
 from tests.runtime.log_cycles import bits, make_cycles
 from tests.runtime.test_log_read import foreign
 from tests.runtime.test_log_recorder import record

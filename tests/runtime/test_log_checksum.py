@@ -4,7 +4,7 @@ import zlib
 
 import numpy as np
 
-from runtime.log.checksum import Cells, checksums
+from runtime.log.exact.checksum import Cells, checksums
 
 
 def test_it_is_the_crc_of_zlib_over_what_each_tick_holds() -> None:

@@ -7,12 +7,12 @@ import cv2
 import numpy as np
 
 from drivers.interface.samples import ColourFrame, Stamp
-from runtime.log.exact import consumed_schemas
-from runtime.log.read import read
+from runtime.log.drawn.scene import COLOUR
+from runtime.log.exact.part import consumed_schemas
+from runtime.log.reading.read import read
+from runtime.log.reading.verify import damaged_ticks, sensed_at
 from runtime.log.recorder import Recorder
-from runtime.log.scene import COLOUR
 from runtime.log.settings import LogSettings
-from runtime.log.verify import damaged_ticks, sensed_at
 from tests.runtime.log_cycles import header, make_cycles
 
 

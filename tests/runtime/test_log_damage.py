@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime.log.cut import cut
-from runtime.log.marks import END
-from runtime.log.paths import files_of
-from runtime.log.read import STATIC, read_file
+from runtime.log.files.marks import END
+from runtime.log.files.paths import files_of
+from runtime.log.reading.cut import cut
+from runtime.log.reading.read import STATIC, read_file
 from tests.runtime.log_cycles import make_cycles
 from tests.runtime.test_log_recorder import record
 

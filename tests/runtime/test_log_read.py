@@ -4,9 +4,9 @@ import pytest
 import rerun as rr
 
 from drivers.interface.errors import ConfigurationError
-from runtime.log.read import read, texts, ticks
-from runtime.log.repair import repair
-from runtime.log.review import review
+from runtime.log.reading.read import read, texts, ticks
+from runtime.log.reading.repair import repair
+from runtime.log.reading.review import review
 from tests.runtime.log_cycles import make_cycles
 from tests.runtime.test_log_recorder import record
 

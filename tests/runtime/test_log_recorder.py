@@ -11,11 +11,11 @@ import pytest
 from drivers.interface.commands import BodyTwist
 from drivers.interface.errors import ConfigurationError
 from runtime.cycle import Cycle
-from runtime.log.read import read, same_content
+from runtime.log.reading.read import read, same_content
+from runtime.log.reading.repair import repair
+from runtime.log.reading.verify import damaged_ticks, sensed_at
 from runtime.log.recorder import Recorder, RecorderReport
-from runtime.log.repair import repair
 from runtime.log.settings import LogSettings
-from runtime.log.verify import damaged_ticks, sensed_at
 from tests.runtime.log_cycles import bits, header, make_cycles
 
 CYCLES = make_cycles(60)
@@ -187,7 +187,7 @@ import sys
 from itertools import count
 from pathlib import Path
 from runtime.log.recorder import Recorder
-from runtime.log.repair import repair
+from runtime.log.reading.repair import repair
 from runtime.log.settings import LogSettings
 from tests.runtime.log_cycles import header, make_cycles
 cycles = make_cycles(10)

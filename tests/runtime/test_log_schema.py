@@ -10,10 +10,10 @@ from drivers.interface.geometry import SE2
 from drivers.interface.samples import EmergencyStop, OperatorEvent, Stamp
 from planners.planner import Diagnostics, Plan
 from runtime.cycle import Verdict
-from runtime.log.columns import Kind
-from runtime.log.exact import consumed_schemas, decided_schemas
+from runtime.log.exact.columns import Kind
+from runtime.log.exact.part import consumed_schemas, decided_schemas
+from runtime.log.exact.schema import Schema
 from runtime.log.header import SCHEMA_VERSION
-from runtime.log.schema import Schema
 from tests.runtime.log_cycles import bits, make_cycles
 
 CYCLE = make_cycles(4)[3]

@@ -9,13 +9,13 @@ import pytest
 from drivers.interface.errors import ConfigurationError
 from runtime.cycle import Cycle
 from runtime.faults import Fault, FaultReport, Response
-from runtime.log.opening import reader_of
-from runtime.log.paths import files_of, numbered
-from runtime.log.read import read, read_file
-from runtime.log.repair import repair
+from runtime.log.files.paths import files_of, numbered
+from runtime.log.reading.opening import reader_of
+from runtime.log.reading.read import read, read_file
+from runtime.log.reading.repair import repair
+from runtime.log.reading.verification import verify
+from runtime.log.reading.verify import sensed_at
 from runtime.log.settings import LogSettings
-from runtime.log.verification import verify
-from runtime.log.verify import sensed_at
 from runtime.outputs import log_path
 from tests.runtime.log_cycles import bits, make_cycles
 from tests.runtime.test_log_recorder import record

@@ -12,7 +12,7 @@ from planners.dwa.planner import DynamicWindow
 from planners.planner import Plan
 from runtime import configuration, registry, run
 from runtime.cli import run_command
-from runtime.log.stream import rows
+from runtime.log.exact.stream import rows
 from runtime.registry import Part
 from runtime.replay.replay import ReplayOptions, replay
 from runtime.replay.stretches import Stretches

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from runtime.cli import run_command
-from runtime.log.isolated import verified
-from runtime.log.opening import DamagedLogError
-from runtime.log.rescue import without_fatal
-from runtime.log.seal import Seal, seal_of
-from runtime.log.verification import Verification
+from runtime.log.files.seal import Seal, seal_of
+from runtime.log.reading.isolated import verified
+from runtime.log.reading.opening import DamagedLogError
+from runtime.log.reading.rescue import without_fatal
+from runtime.log.reading.verification import Verification
 from runtime.replay.damage import damage_of
 from tests.runtime.log_cycles import make_cycles
 from tests.runtime.test_log_damage import messages

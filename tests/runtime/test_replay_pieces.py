@@ -13,9 +13,9 @@ import pytest
 
 from runtime import registry
 from runtime.cli import run_command
-from runtime.log.cut import CUT
-from runtime.log.paths import files_of
-from runtime.log.read import STATIC, read
+from runtime.log.files.paths import files_of
+from runtime.log.reading.cut import CUT
+from runtime.log.reading.read import STATIC, read
 from runtime.replay.replay import ReplayOptions, replay
 from tests.runtime.test_replay import record
 

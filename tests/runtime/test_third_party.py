@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from runtime.log import read
+from runtime.log.reading import read
 
 PLANNER = '''
 """Somebody else's planner."""

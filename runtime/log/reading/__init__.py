@@ -1,0 +1,1 @@
+"""What is done with a log afterwards: read, verify, repair, cut, review."""
