@@ -72,8 +72,8 @@ class Lookout:
         s, demand = self._settings, self.demand_m_s
         if not s.enabled:
             return Outlook()
-        unseen = Unseen(max(demand, 1e-3), self._apart_m, s.least_width_m, s.side_m)
-        when, whence = arrivals(seen, at, normal, unseen)
+        unseen = Unseen(max(demand, 1e-3), self._apart_m, s.width_m, s.side_m)
+        when, whence = arrivals(seen, at, normal, SPACING_M, unseen)
         found = openings(when, self.arcs_m, unseen)
         inside = bool((found[:, 0] < 0.0).any())
         self._committed &= inside

@@ -15,7 +15,7 @@ class Unseen(NamedTuple):
 
     speed_m_s: float
     apart_m: float  # between him and the robot's centre
-    least_width_m: float  # narrower openings let nobody through
+    width_m: float  # of his body
     side_m: float  # how far to the sides is looked
 
 
@@ -74,20 +74,37 @@ def arrival(seen: Seen, x: float, y: float, out_x: float, out_y: float, unseen: 
                 out_of_view = min(out_of_view, d)
         reached = k + 1
     for k in range(reached - 1, -1, -1):
-        if (k + 1) * step < unseen.apart_m:
+        if (k + 1) * step <= unseen.apart_m:
             break
         end = max(end + step / unseen.speed_m_s, -ages[k])
     return end, out_of_view
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def arrivals(seen: Seen, at: F64, normal: F64, unseen: Unseen) -> tuple[F64, F64]:
-    """Return `arrival` from the right and from the left of points, shape (n, 2), with normals to the left: each shape (n, 2)."""
-    when, whence = np.empty((len(at), 2)), np.empty((len(at), 2))
-    for i in range(len(at)):
-        for side in range(2):
-            sign = 1.0 if side else -1.0
-            when[i, side], whence[i, side] = arrival(seen, at[i, 0], at[i, 1], sign * normal[i, 0], sign * normal[i, 1], unseen)
+def arrivals(seen: Seen, at: F64, normal: F64, spacing_m: float, unseen: Unseen) -> tuple[F64, F64]:
+    """Return when somebody can come from the right and from the left of points, and from how far out, each shape (n, 2).
+
+    He is as wide as `width_m`: where one of the rays that he takes up was seen to be free, or is closed, he is not.
+
+    Args:
+        seen: what is known.
+        at: points in odom, shape (n, 2).
+        normal: unit, to the left, shape (n, 2).
+        spacing_m: between the points.
+        unseen: who may come.
+    """
+    n = len(at)
+    ray, whence, when = np.empty((n, 2)), np.empty((n, 2)), np.full((n, 2), np.inf)
+    taken = max(1, int(np.ceil(unseen.width_m / spacing_m)))
+    for side in range(2):
+        sign = 1.0 if side else -1.0
+        for i in range(n):
+            ray[i, side], whence[i, side] = arrival(seen, at[i, 0], at[i, 1], sign * normal[i, 0], sign * normal[i, 1], unseen)
+        for first in range(1 - taken, n):
+            begin, end = max(first, 0), min(first + taken, n)
+            hidden = ray[begin:end, side].max()
+            for i in range(begin, end):
+                when[i, side] = min(when[i, side], hidden)
     return when, whence
 
 
@@ -98,7 +115,7 @@ def openings(when: F64, arcs_m: F64, unseen: Unseen) -> F64:
     Args:
         when: from the right and from the left, shape (n, 2) [s].
         arcs_m: of the rays, shape (n,), evenly spaced.
-        unseen: how wide an opening is at least, and how far off the robot must stay.
+        unseen: how far off the robot must stay.
 
     Returns:
         shape (m, 3) [m, m, s], in order; those that meet are one.  Where no wall follows there is no opening but open ground, on
@@ -111,10 +128,9 @@ def openings(when: F64, arcs_m: F64, unseen: Unseen) -> F64:
         while i < n and min(when[i, 0], when[i, 1]) < np.inf:
             soonest = min(soonest, when[i, 0], when[i, 1])
             i += 1
-        width = 2.0 * half * (i - first)
         if i == first:
             i += 1
-        elif i < n and (width >= unseen.least_width_m or first == 0):
+        elif i < n:
             begin, end = arcs_m[first] - half - unseen.apart_m, arcs_m[i - 1] + half + unseen.apart_m
             if count > 0 and begin <= found[count - 1, 1]:
                 found[count - 1, 1], found[count - 1, 2] = end, min(found[count - 1, 2], soonest)

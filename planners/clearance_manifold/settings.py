@@ -119,7 +119,9 @@ class LookoutSettings(Settings):
         default=4.0, gt=0.0, le=60.0, description="waited for that walker; after it slower ones, after twice of it none"
     )
     margin_m: float = Field(default=0.15, ge=0.0, le=1.0, description="between the robot and who steps out")
-    least_width_m: float = Field(default=0.4, ge=0.1, le=2.0, description="narrower openings let nobody through")
+    width_m: float = Field(
+        default=0.4, ge=0.1, le=2.0, description="of who steps out, at least; narrower openings let nobody through"
+    )
     side_m: float = Field(default=2.4, gt=0.2, le=10.0, description="how far to the sides of the way is looked")
     ahead_m: float = Field(default=2.4, gt=0.5, le=10.0, description="how far along it")
     creep_m_s: float = Field(default=0.15, ge=0.0, le=1.0, description="speed where the robot stands in an opening already")
