@@ -72,21 +72,23 @@ def obstacles(
 ) -> int:  # fmt: skip
     """Charge the mean inflated cost, `preferring` only, and collisions; return how many trajectories do not collide."""
     steps, batch = x.shape
+    rows, columns = around.cost.shape
+    total, worst = np.zeros(batch, np.float32), np.zeros(batch, np.float32)
+    for k in range(steps):
+        for b in range(batch):
+            column, row = (x[k, b] - around.corner_x) * around.per_m, (y[k, b] - around.corner_y) * around.per_m
+            if 0.0 <= row < rows and 0.0 <= column < columns:
+                here = around.cost[int(row), int(column)]
+                total[b] += here
+                worst[b] = max(worst[b], here)
     scale = weight / (254.0 * steps)
     free = 0
     for b in range(batch):
-        total, collided = 0.0, False
-        for k in range(steps):
-            here = cost_at(around, x[k, b], y[k, b])
-            if here >= INSCRIBED:
-                collided = True
-                break
-            total += here
-        if collided:
+        if worst[b] >= INSCRIBED:
             costs[b] += scale * collision
         else:
             free += 1
-            costs[b] += scale * total if preferring else 0.0
+            costs[b] += scale * total[b] if preferring else 0.0
     return free
 
 

@@ -118,7 +118,8 @@ class Optimizer:
 
     def cheapest(self, count: int) -> F32:
         """Return the points of the cheapest trajectories, shape (count * steps, 2)."""
-        best = np.argsort(self.costs, kind="stable")[:count]
+        count = min(count, len(self.costs))
+        best = np.argpartition(self.costs, count - 1)[:count]
         return np.stack((self.x[:, best].T.ravel(), self.y[:, best].T.ravel()), axis=1)
 
     def snapshot(self) -> bytes:

@@ -6,13 +6,19 @@ import numpy as np
 import pytest
 
 from drivers.interface.commands import BodyTwist
+from drivers.interface.errors import ConfigurationError
 from drivers.interface.geometry import SE2
+from planners.graceful.planner import Graceful
+from planners.mppi.planner import Mppi
 from planners.path_following import ARRIVED, ENCLOSED, INVALID, NO_ROUTE, ahead, task_of
-from planners.planner import no_path
+from planners.planner import PlannerSetup, no_path
 from planners.polyline import arc_length
+from planners.regulated_pure_pursuit.planner import RegulatedPurePursuit
 from planners.router import Route
+from tests.planners.followers import planner_of, route_along
 from tests.planners.synthetic import ORIGIN, STANDING, Box, Disc, belief_of
 
+FOLLOWERS = [Graceful, Mppi, RegulatedPurePursuit]
 CORNER = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 3.0]])
 
 
@@ -75,3 +81,40 @@ def test_at_the_goal_a_heading_asked_for_is_still_to_be_turned_to():
 @pytest.mark.parametrize(("wall_x", "required_m"), [(-0.4, 0.3), (-0.2, 0.2)])
 def test_inside_its_margin_the_robot_may_go_where_it_is_no_narrower_than_here(wall_x, required_m):
     assert task_at(obstacles=[Box(-3.0, -3.0, wall_x, 3.0)]).required_m == pytest.approx(required_m, abs=0.005)
+
+
+@pytest.mark.parametrize("cls", FOLLOWERS)
+def test_a_robot_without_a_base_is_refused(cls):
+    with pytest.raises(ConfigurationError, match=r"planner.name '\w+' drives a base, but the robot has none"):
+        cls(cls.Settings(), PlannerSetup(0.05, 0.12, None, 0))
+
+
+@pytest.mark.parametrize("cls", FOLLOWERS)
+@pytest.mark.parametrize(
+    ("obstacles", "path", "twist", "why"),
+    [
+        ([Box(-9.0, -9.0, 9.0, 9.0)], CORNER, STANDING, ENCLOSED),
+        ([], [[0.0, 0.0], [math.nan, 1.0]], STANDING, INVALID),
+        ([], CORNER, BodyTwist(math.nan, 0.0, 0.0), INVALID),
+        ([], [[0.0, 0.0], [0.01, 0.0]], STANDING, ARRIVED),
+    ],
+    ids=["all occupied", "route that is none", "velocity that is none", "at the goal"],
+)
+def test_bad_input_makes_a_follower_stand_and_say_why(cls, obstacles, path, twist, why):
+    plan = planner_of(cls).plan(belief_of(obstacles, twist=twist), route_along(path))
+    assert plan.base == BodyTwist()
+    assert plan.diagnostics.standing == why
+
+
+@pytest.mark.parametrize("cls", FOLLOWERS)
+def test_a_path_that_turns_back_on_itself_or_has_double_points_is_no_trouble(cls):
+    for path in ([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0], [1.0, 0.0]], [[0.0, 0.0], [1.0, 0.0], [0.2, 0.0]]):
+        assert planner_of(cls).plan(belief_of([]), route_along(path)).base.finite
+
+
+@pytest.mark.parametrize("cls", FOLLOWERS)
+def test_the_same_situation_gives_the_same_command_to_the_bit(cls):
+    belief, route = belief_of([Disc(1.0, 0.3, 0.2)], twist=BodyTwist(0.2, 0.0, 0.1)), route_along(CORNER)
+    first, second = planner_of(cls), planner_of(cls)
+    for _ in range(3):
+        assert first.plan(belief, route).base == second.plan(belief, route).base
