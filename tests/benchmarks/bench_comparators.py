@@ -8,6 +8,7 @@ from drivers.interface.commands import BodyTwist
 from drivers.interface.geometry import SE2
 from planners.mpc_cbf.planner import BarrierMpc
 from planners.orca.planner import ReciprocalAvoidance
+from planners.teb.planner import ElasticBand
 from tests.planners.synthetic import Box, Disc, belief_of, mission_to
 from tests.planners.tracked import planner_of, straight_router, tracks_of
 
@@ -39,5 +40,5 @@ def _ticking(planner: Any) -> Callable[[], object]:
 
 def cases() -> list[tuple[str, Callable[[], object]]]:
     """Return the calls, everything compiled and prepared."""
-    planners = {"mpc_cbf_step": BarrierMpc, "orca_step": ReciprocalAvoidance}
+    planners = {"mpc_cbf_step": BarrierMpc, "orca_step": ReciprocalAvoidance, "teb_step": ElasticBand}
     return [(name, _ticking(planner_of(planner))) for name, planner in planners.items()]

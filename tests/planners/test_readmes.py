@@ -6,13 +6,14 @@ import planners
 from planners.dwa.planner import DynamicWindow
 from planners.graceful.planner import Graceful
 from planners.joint_waypoints.planner import JointWaypoints
-from planners.mppi.planner import Mppi
 from planners.mpc_cbf.planner import BarrierMpc
+from planners.mppi.planner import Mppi
 from planners.orca.planner import ReciprocalAvoidance
 from planners.point_ds.planner import PointAttractor
 from planners.regulated_pure_pursuit.planner import RegulatedPurePursuit
 from planners.routers.grid import GridRouter
 from planners.shields.field_cbf import FieldCbf
+from planners.teb.planner import ElasticBand
 
 
 @pytest.mark.parametrize(
@@ -26,6 +27,7 @@ from planners.shields.field_cbf import FieldCbf
         ("joint_waypoints", JointWaypoints),
         ("mpc_cbf", BarrierMpc),
         ("orca", ReciprocalAvoidance),
+        ("teb", ElasticBand),
         ("routers", GridRouter),
         ("shields", FieldCbf),
     ],
