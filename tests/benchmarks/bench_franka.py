@@ -1,4 +1,4 @@
-"""How the arm's 1 kHz exchange keeps up while the loop plans, and how soon the arm stands when its driver is killed."""
+"""How the arm's 1 kHz exchange keeps up while the loop plans, camera and all."""
 
 import os
 import subprocess
@@ -9,24 +9,17 @@ from drivers.franka.driver import ExchangeFigures
 from runtime import configuration
 from runtime.assembly import Assembly
 from runtime.run import RunOptions, run
-from tests.benchmarks.figure import Figure, of_distribution
-from tests.faults.arm_dead_man import arm_scene
+from tests.benchmarks.figure import Figure
 from tests.faults.emulated import ROOT, free_port
 from tests.sim_drivers.firmware.fcibench import free_host
 
-TRIES = 20
 ROUNDS = 3
 COMMAND = "from runtime.cli import main; main()"
 
 
 def figures() -> list[Figure]:
-    """Run the way-point mission against an emulated arm, then strike at a swinging one."""
-    measured = _exchange()
-    with arm_scene() as scene:
-        for blow in ("kill", "stop", "kill_io"):
-            tries = [scene.attempt(blow) for _ in range(TRIES)]
-            measured.append(of_distribution(f"arm_dead_man_{blow}_still", [1e3 * each.still_s for each in tries]))
-    return measured
+    """Run the way-point mission against an emulated arm."""
+    return _exchange()
 
 
 @dataclass

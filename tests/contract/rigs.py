@@ -78,6 +78,11 @@ class FreeRunning:
         self._run.catch_up_ns = getattr(self._firmware, "catch_up_ns", CATCH_UP_NS)
         self._over = threading.Event()
 
+    @property
+    def late_ns(self) -> int:
+        """For how long the world has stood still, the machine being too slow."""
+        return self._run.late_ns
+
     @contextmanager
     def running(self) -> Iterator[None]:
         """Within the block the wire is bound and time passes."""

@@ -1,7 +1,5 @@
 """One try of the arm's dead man: it is swung, the driver's process is ended or stopped, and its joints are watched."""
 
-import os
-import signal
 import subprocess
 import sys
 import tempfile
@@ -13,18 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
+from tests.faults.dead_man import Try, strike
 from tests.faults.emulated import ROOT, children, free_port, until
 from tests.sim_drivers.firmware.fcibench import free_host
 
 SWINGING_RAD_S, STANDING_RAD_S = 1.0, 0.02
-
-
-@dataclass(frozen=True)
-class ArmTry:
-    """What followed."""
-
-    speed_rad_s: float  # at the blow
-    still_s: float  # from the blow until the arm stood
 
 
 @dataclass
@@ -38,18 +29,18 @@ class ArmScene:
     def speed_rad_s(self) -> float:
         return float(self.seen[1])
 
-    def attempt(self, blow: str) -> ArmTry:
-        """Swing, strike, watch.  `blow`: kill or stop the runtime, or kill_io, the process at the wire."""
+    def attempt(self, blow: str) -> Try:
+        """Swing, strike, watch."""
         with subprocess.Popen([sys.executable, "-m", "tests.faults.arm_commander", self.host], cwd=ROOT) as process:
             try:
                 until(lambda: self.speed_rad_s > SWINGING_RAD_S or process.poll() is not None, "it never swung")
                 assert process.poll() is None
                 (io,) = children(process.pid)
-                struck_s, speed = time.monotonic(), self.speed_rad_s
-                os.kill(io if blow == "kill_io" else process.pid, signal.SIGSTOP if blow == "stop" else signal.SIGKILL)
-                if blow == "kill_io":  # whoever starts another process at the wire would come back
-                    os.kill(process.pid, signal.SIGSTOP)
-                return ArmTry(speed, self._stood_s() - struck_s)
+                struck_s = time.monotonic()
+                strike(process.pid, io, blow)
+                still_s = self._stood_s()
+                braked_s, late_s = self.seen[2:4].tolist()
+                return Try(braked_s - struck_s, still_s - struck_s, late_s)
             finally:
                 process.kill()
 
@@ -57,7 +48,7 @@ class ArmScene:
         """Return since when the arm stands, once it has stood for a while."""
         since_s, deadline_s = None, time.monotonic() + 20.0
         while since_s is None or self.seen[0] - since_s < 0.1:
-            now_s, speed = self.seen.tolist()
+            now_s, speed = self.seen[:2].tolist()
             since_s = None if speed > STANDING_RAD_S else (since_s or now_s)
             assert time.monotonic() < deadline_s, "it never stood"
             time.sleep(0.001)
@@ -70,11 +61,11 @@ def arm_scene() -> Iterator[ArmScene]:
     host = free_host()
     with tempfile.TemporaryDirectory() as folder:
         memory = Path(folder) / "speed"
-        memory.write_bytes(bytes(16))
+        memory.write_bytes(bytes(32))
         told = [sys.executable, "-m", "tests.faults.arm_world", host, str(free_port()), str(memory)]
         with subprocess.Popen(told, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
             try:
                 assert process.stdout.readline() == "ready\n"
-                yield ArmScene(host, np.memmap(memory, np.float64, "r", shape=(2,)))
+                yield ArmScene(host, np.memmap(memory, np.float64, "r", shape=(4,)))
             finally:
                 process.kill()

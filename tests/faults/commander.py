@@ -1,11 +1,13 @@
-"""A runtime reduced to its base: `python -m tests.faults.commander PORT VX` opens the driver and drives until it is ended."""
+"""A runtime reduced to its base: `python -m tests.faults.commander PORT VX` drives until it is told to stop, or ended."""
 
+import signal
 import sys
 import time
 
 from drivers.interface.commands import BodyTwist
 from drivers.interface.devices import DeviceSetup
 from drivers.omni_can.driver import OmniCanBase
+from tests.faults.told import until_told
 
 LIFETIME_NS = 250_000_000
 
@@ -15,10 +17,11 @@ def main(port: int, vx_m_s: float) -> None:
     settings = OmniCanBase.Settings(bus=bus, verify_watchdog=False, connect_s=20.0)
     base = OmniCanBase(settings, DeviceSetup("base", 0, time.monotonic_ns))
     base.open()
-    while True:
+    for _ in until_told():
         base.command(BodyTwist(vx=vx_m_s), time.monotonic_ns() + LIFETIME_NS)
         base.drain()
-        time.sleep(0.05)
+    base.stop()
+    signal.pause()
 
 
 if __name__ == "__main__":

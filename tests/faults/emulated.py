@@ -129,6 +129,7 @@ class Watcher:
         self._link.settimeout(0.2)
         self._leave = threading.Event()
         self.newest: TruthSample | None = None
+        self.late_ns = 0  # for how long the world has stood still
         self._thread = threading.Thread(target=self._watch)
         self._thread.start()
 
@@ -148,7 +149,8 @@ class Watcher:
                 if time.monotonic() - asked_s > 0.25:
                     asked_s = time.monotonic()
                     self._link.send(WATCH)
-                self.newest = decode(self._link.recv(LARGEST_DATAGRAM), time.monotonic_ns()).sample
+                look = decode(self._link.recv(LARGEST_DATAGRAM), time.monotonic_ns())
+                self.newest, self.late_ns = look.sample, look.late_ns
 
 
 def children(pid: int) -> list[int]:

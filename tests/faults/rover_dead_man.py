@@ -1,10 +1,9 @@
 """One try of the rover's dead man: it is driven, its driver's process is ended or stopped, and the autopilot is watched.
 
-`python -m tests.faults.rover_dead_man URL VX` is the runtime, reduced to its base: it opens the driver and drives.
+`python -m tests.faults.rover_dead_man URL VX` is the runtime, reduced to its base: it drives until it is told to stop, or ended.
 """
 
 import math
-import os
 import signal
 import subprocess
 import sys
@@ -18,11 +17,12 @@ from drivers.rover_serial.driver import RoverBase
 from sim_drivers.scenarios.square import Square, SquareSettings
 from sim_drivers.world import MujocoWorld, WorldSettings
 from tests.contract.rigs import FreeRunning, Rig
-from tests.faults.dead_man import Try
+from tests.faults.dead_man import DRIVING, Try, strike
 from tests.faults.emulated import ROOT, children, free_port, until
+from tests.faults.told import until_told
 
 LIFETIME_NS = 250_000_000
-DRIVING_M_S, STANDING_M_S = 0.25, 0.02
+FULL_M_S, STANDING_M_S = 0.9, 0.02
 
 
 class Rover:
@@ -57,18 +57,17 @@ class Rover:
         return state.armed and state.follows and state._order is not None and state._order.speed_m_s != 0.0
 
     def attempt(self, blow: str, vx_m_s: float) -> Try:
-        """Drive, strike, watch.  `blow`: kill or stop the runtime, or kill_io, the process at the wire."""
+        """Drive, strike, watch."""
         arguments = [sys.executable, "-m", "tests.faults.rover_dead_man", self.url, str(vx_m_s)]
         with subprocess.Popen(arguments, cwd=ROOT) as process:
             try:
-                until(lambda: self.speed_m_s > DRIVING_M_S, "it never drove")
+                until(lambda: self.speed_m_s > DRIVING * abs(vx_m_s), "it never drove")
                 (io,) = children(process.pid)
                 struck_s, self._timeouts = time.monotonic(), self.timeouts
-                os.kill(io if blow == "kill_io" else process.pid, signal.SIGSTOP if blow == "stop" else signal.SIGKILL)
-                if blow == "kill_io":  # whoever starts another process at the wire would come back
-                    os.kill(process.pid, signal.SIGSTOP)
-                safe_s = _when(lambda: not self.is_told_to_drive) - struck_s
-                return Try(safe_s, _when(lambda: self.speed_m_s < STANDING_M_S) - struck_s)
+                strike(process.pid, io, blow)
+                safe_s, late_ns = _when(lambda: not self.is_told_to_drive) - struck_s, self.running.late_ns
+                still_s = _when(lambda: self.speed_m_s < STANDING_M_S) - struck_s
+                return Try(safe_s, still_s, (self.running.late_ns - late_ns) * 1e-9)
             finally:
                 process.kill()
 
@@ -92,10 +91,11 @@ def _when(holds) -> float:
 def main(url: str, vx_m_s: float) -> None:
     base = RoverBase(RoverBase.Settings(url=url, connect_s=30.0), DeviceSetup("base", 0, time.monotonic_ns))
     base.open()
-    while True:
+    for _ in until_told():
         base.command(BodyTwist(vx=vx_m_s), time.monotonic_ns() + LIFETIME_NS)
         base.drain()
-        time.sleep(0.05)
+    base.stop()
+    signal.pause()
 
 
 if __name__ == "__main__":

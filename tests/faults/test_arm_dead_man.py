@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.faults.arm_dead_man import SWINGING_RAD_S, arm_scene
+from tests.faults.arm_dead_man import arm_scene
 
 
 @pytest.fixture(scope="module")
@@ -15,5 +15,4 @@ def scene():
 def test_the_arm_decelerates_and_stands(scene, blow):
     for _ in range(2):
         tried = scene.attempt(blow)
-        assert tried.speed_rad_s > SWINGING_RAD_S
-        assert tried.still_s > 0.02
+        assert 0.0 < tried.safe_s < tried.still_s
