@@ -41,7 +41,7 @@ class Scorer:
     def warm_up(self, batch: Optimizer, field: F32) -> None:
         """Compile every critic, those too that seldom have a say; `field` is of a belief's type, shape (rows, columns)."""
         costs, x, y, path = batch.costs, batch.x, batch.y, np.zeros((2, 2), np.float32)
-        cost, zero, open_ = np.zeros(field.shape, np.float32), np.float32(0.0), np.ones(2, np.bool_)
+        cost, zero = np.zeros(field.shape, np.float32), np.float32(0.0)
         around = Costmap(cost, zero, zero, np.float32(1.0))
         critics.inflate(field, 0.5, 1.0, 1.0, cost)
         critics.constraints(batch.controls, batch.lowest, batch.highest, 0.1, 1.0, costs)
@@ -51,7 +51,7 @@ class Scorer:
         critics.backwards(batch.controls, 0.1, 1.0, costs)
         critics.twirling(batch.controls, 1.0, costs)
         critics.furthest_reached(x, y, path)
-        critics.path_distance(x, y, zero, zero, path, critics.collision_free(around, path) & open_, 1, 1.0, costs)
+        critics.path_distance(x, y, zero, zero, path, critics.collision_free(around, path), 1, 1.0, costs)
         critics.end_distance(x, y, zero, zero, 1.0, costs)
         critics.end_angle(x, y, batch.yaw, zero, zero, 1.0, costs)
 
@@ -77,7 +77,7 @@ class Scorer:
             critics.goal_distance(batch.x, batch.y, *goal, s.goal_weight, costs)
         if task.turn_rad is not None and task.distance_m < s.goal_angle_threshold_m:
             critics.goal_angle(batch.yaw, float(task.pose[2] + task.turn_rad), s.goal_angle_weight, costs)
-        if task.distance_m > s.prefer_forward_threshold_m and batch.lowest[0] < 0.0:
+        if task.distance_m > s.prefer_forward_threshold_m:
             critics.backwards(batch.controls, s.model_dt_s, s.prefer_forward_weight, costs)
         if s.twirling_weight > 0.0 and batch.highest[1] > 0.0:
             critics.twirling(batch.controls, s.twirling_weight, costs)
