@@ -32,6 +32,29 @@ def resample(path: F64, spacing_m: float) -> F64:
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def beginning(path: F64, length_m: float, spacing_m: float) -> tuple[F64, F64]:
+    """Return the first `length_m` of the path with points at least `spacing_m` apart, and the distance along it of each.
+
+    Both ends are kept, so that there are at least two points: shapes (m, 2) and (m,).
+    """
+    kept, along = np.empty((len(path) + 1, 2)), np.empty(len(path) + 1)
+    kept[0], along[0] = path[0], 0.0
+    count, travelled = 1, 0.0
+    for i in range(1, len(path)):
+        travelled += np.hypot(path[i, 0] - path[i - 1, 0], path[i, 1] - path[i - 1, 1])
+        last = i == len(path) - 1 or travelled >= length_m
+        if last or travelled - along[count - 1] >= spacing_m:
+            kept[count], along[count] = path[i], travelled
+            count += 1
+        if last:
+            break
+    if count == 1:
+        kept[1], along[1] = path[0], 0.0
+        count = 2
+    return kept[:count], along[:count]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def point_along(path: F64, distance_m: float) -> tuple[float, float]:
     """Return the point of the path, shape (n, 2), that lies `distance_m` along it; its end when it is shorter."""
     left = distance_m

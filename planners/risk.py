@@ -98,9 +98,32 @@ def _check(count: int, fraction: float) -> None:
         raise ValueError(f"it takes at least one sample and a fraction in (0, 1], not {count} and {fraction:g}")
 
 
+_FEW = 40  # up to so many are gathered by insertion, which takes their square
+
+
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def gather_smallest(values: NDArray[np.float32], count: int) -> None:
-    """Reorder values, shape (n,), so that the `count` smallest come first, in no particular order.
+    """Reorder values, shape (n,), so that the `count` smallest come first."""
+    if count > _FEW:
+        _partition(values, count)
+        return
+    for i in range(1, len(values)):
+        value = values[i]
+        if i >= count and value >= values[count - 1]:
+            continue
+        j = i
+        if i >= count:
+            j = count - 1
+            values[i] = values[j]
+        while j > 0 and values[j - 1] > value:
+            values[j] = values[j - 1]
+            j -= 1
+        values[j] = value
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _partition(values: NDArray[np.float32], count: int) -> None:
+    """Do the same by quickselect: in no particular order, but in time that grows with n alone.
 
     Source: Hoare, Algorithm 65: Find, Communications of the ACM 4(7), 1961; the middle of three as pivot.
     """

@@ -27,27 +27,22 @@ class Observed:
 
 def observed(tracks: tuple[Track, ...]) -> Observed:
     """Return the tracks as arrays, without those that are not finite."""
-    sound = [track for track in tracks if _is_finite(track)]
-    state = np.array([(*track.position_in_odom, *track.velocity_in_odom) for track in sound]).reshape(-1, 4)
-    covariance = np.array([track.covariance for track in sound]).reshape(-1, 4, 4)
-    c = 0.5 * (covariance[:, (0, 0, 2), (0, 2, 2)] + covariance[:, (1, 1, 3), (1, 3, 3)])
-    c[:, (0, 2)] = np.maximum(c[:, (0, 2)], 0.0)
-    limit = np.sqrt(c[:, 0] * c[:, 2])
-    c[:, 1] = np.clip(c[:, 1], -limit, limit)
+    rows = np.array(
+        [(track.identity, *track.position_in_odom, *track.velocity_in_odom, track.radius_m) for track in tracks], np.float64
+    ).reshape(-1, 6)
+    covariance = np.array([track.covariance for track in tracks]).reshape(-1, 4, 4)
+    sound = np.isfinite(rows).all(axis=1) & np.isfinite(covariance).all(axis=(1, 2))
+    rows, covariance = rows[sound], covariance[sound]
+    axes = covariance[:, (0, 0, 2), (0, 2, 2)] + covariance[:, (1, 1, 3), (1, 3, 3)]
+    spread = np.ascontiguousarray(0.5 * axes)
+    spread[:, ::2] = np.maximum(spread[:, ::2], 0.0)
+    limit = np.sqrt(spread[:, 0] * spread[:, 2])
+    spread[:, 1] = np.clip(spread[:, 1], -limit, limit)
     return Observed(
-        identity=np.array([track.identity for track in sound], np.int64),
-        state=state,
-        spread=c,
-        radius_m=np.array([track.radius_m for track in sound], np.float64),
-        left_out=len(tracks) - len(sound),
+        rows[:, 0].astype(np.int64), np.ascontiguousarray(rows[:, 1:5]), spread, rows[:, 5].copy(), len(tracks) - len(rows)
     )
 
 
 def nobody() -> Observed:
     """Return no obstacle."""
     return observed(())
-
-
-def _is_finite(track: Track) -> bool:
-    numbers = (*track.position_in_odom, *track.velocity_in_odom, track.radius_m)
-    return bool(np.isfinite(numbers).all() and np.isfinite(track.covariance).all())

@@ -6,6 +6,7 @@ Source: Han, Zhu, RCSP, algorithm 1 (line 3) and appendix A.
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 from estimators.belief import F64
 
@@ -30,15 +31,24 @@ def floored(weights: F64, floor: float) -> F64:
     return np.asarray(floor + (1.0 - weights.shape[-1] * floor) * weights)
 
 
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def heaviest(weights: F64, count: int) -> F64:
-    """Return the weights with all but the `count` largest set to zero, summing to one; of equals the earlier stays.
+    """Return weights, shape (rows, conjectures), with all but the `count` largest of a row zero and the rest summing to one.
 
-    >>> heaviest(np.array([0.2, 0.5, 0.3]), 2).tolist()
-    [0.0, 0.625, 0.375]
+    Of equals the earlier stays.
+
+    >>> heaviest(np.array([[0.2, 0.5, 0.3]]), 2).round(3).tolist()
+    [[0.0, 0.625, 0.375]]
     """
-    if count >= weights.shape[-1]:
-        return weights
-    order = np.argsort(-weights, axis=-1, kind="stable")
-    kept = weights.copy()
-    np.put_along_axis(kept, order[..., count:], 0.0, axis=-1)
-    return np.asarray(kept / kept.sum(axis=-1, keepdims=True))
+    kept = np.zeros(weights.shape)
+    for row in range(len(weights)):
+        total = 0.0
+        for _ in range(min(count, weights.shape[1])):
+            best = -1
+            for c in range(weights.shape[1]):
+                if kept[row, c] == 0.0 and (best < 0 or weights[row, c] > weights[row, best]):
+                    best = c
+            kept[row, best] = weights[row, best]
+            total += weights[row, best]
+        kept[row] /= total
+    return kept

@@ -29,7 +29,7 @@ class Conjecture(Settings):
     )
     least_speed_m_s: float = Field(default=0.0, ge=0.0, le=5.0, description="speed that pursuit counts with where it stands")
     acceleration_m_s2: float = Field(
-        0.4, ge=0.0, le=20.0, description="standard deviation of what changes its velocity, each axis"
+        default=0.1, ge=0.0, le=20.0, description="standard deviation of what changes its velocity, each axis"
     )
     position_sigma_m: float = Field(default=0.05, gt=0.0, le=1.0, description="least noise of an observed position, each axis")
     velocity_sigma_m_s: float = Field(default=0.15, gt=0.0, le=5.0, description="least noise of an observed velocity, each axis")
@@ -43,7 +43,7 @@ class PredictionSettings(Settings):
     """The family Theta of section 4.1 and the stabilised posterior of appendix A."""
 
     family: tuple[Name, ...] = Field(default=FAMILY, min_length=1, description="conjectures in use")
-    static: Conjecture = _conjecture(0.10, 0.0, acceleration_m_s2=0.15)
+    static: Conjecture = _conjecture(0.10, 0.0, acceleration_m_s2=0.05)
     slow: Conjecture = _conjecture(0.15, 0.5)
     constant: Conjecture = _conjecture(0.40, 1.0)
     fast: Conjecture = _conjecture(0.15, 1.5)

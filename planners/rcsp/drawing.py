@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
+from numpy.typing import NDArray
 
-from estimators.belief import F32
+from estimators.belief import F32, F64
 from planners.planner import Drawing, no_path
 from planners.rcsp.evaluation import Evaluation
 from planners.rcsp.kernels import first_conflict
 from planners.velocity_lattice import Rollouts
 
 EVERY = 5  # steps between two dots
-SHOWN = 24  # scenarios of which the futures are drawn
+SHOWN = 16  # scenarios of which the futures are drawn
 GROUPS = ("candidates_good", "candidates_fair", "candidates_poor", "candidates_blocked")
 
 
@@ -24,24 +26,36 @@ def commitment_step(rolled: Rollouts, command: int, position: F32, contact: F32,
 
 def drawn(rolled: Rollouts, told: Evaluation, names: tuple[str, ...], keenest: int, commitment: int) -> tuple[Drawing, ...]:
     """Return the layers: dots along candidates in thirds of their objective, dots of futures, the point of no return."""
-    ends = np.stack((rolled.x[:, EVERY - 1 :: EVERY], rolled.y[:, EVERY - 1 :: EVERY]), axis=2).astype(np.float64)
-    low, high = np.quantile(told.objective, (1.0 / 3.0, 2.0 / 3.0))
-    rank = np.where(told.objective >= high, 0, np.where(told.objective >= low, 1, 2))
+    order, third = np.argsort(-told.objective, kind="stable"), len(told.objective) // 3
+    rank = np.empty(len(order), np.int64)
+    rank[order[:third]], rank[order[third : 2 * third]], rank[order[2 * third :]] = 0, 1, 2
     rank[~told.free] = 3
-    candidates = [Drawing(name, ends[rank == k].reshape(-1, 2), connected=False) for k, name in enumerate(GROUPS)]
+    ends = np.stack((rolled.x[:, -1], rolled.y[:, -1]), axis=1).astype(np.float64)
+    candidates = [Drawing(name, ends[rank == k], connected=False) for k, name in enumerate(GROUPS)]
+    dots, edges = by_conjecture(told.futures.position_in_odom, told.futures.conjecture, len(names), EVERY, SHOWN)
+    futures = [Drawing(f"futures_{name}", dots[edges[k] : edges[k + 1]], connected=False) for k, name in enumerate(names)]
     point = no_path()
     if commitment >= 0:
         at = max(commitment - 1, 0)
         point = np.array([[rolled.x[keenest, at], rolled.y[keenest, at]]], np.float64)
-    return (*candidates, *_futures(told, names), Drawing("commitment", point, connected=False))
+    return (*candidates, *futures, Drawing("commitment", point, connected=False))
 
 
-def _futures(told: Evaluation, names: tuple[str, ...]) -> list[Drawing]:
-    """Return the futures of the first scenarios, by conjecture."""
-    position = told.futures.position_in_odom[EVERY - 1 :: EVERY, :, :, :SHOWN]
-    points = np.moveaxis(position, 2, 3)  # (steps, obstacles, scenarios, 2)
-    which = told.futures.conjecture[:, :SHOWN]
-    return [
-        Drawing(f"futures_{name}", points[:, which == index].reshape(-1, 2).astype(np.float64), connected=False)
-        for index, name in enumerate(names)
-    ]
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def by_conjecture(
+    position: F32, which: NDArray[np.int64], conjectures: int, every: int, shown: int
+) -> tuple[F64, NDArray[np.int64]]:
+    """Return every so many steps of the first scenarios, shape (dots, 2), ordered by conjecture, and where each one's end."""
+    steps, obstacles, _, n = position.shape
+    n = min(n, shown)
+    dots, edges = np.empty((steps // every * obstacles * n, 2)), np.zeros(conjectures + 1, np.int64)
+    at = 0
+    for c in range(conjectures):
+        for m in range(obstacles):
+            for i in range(n):
+                if which[m, i] == c:
+                    for k in range(every - 1, steps, every):
+                        dots[at, 0], dots[at, 1] = position[k, m, 0, i], position[k, m, 1, i]
+                        at += 1
+        edges[c + 1] = at
+    return dots, edges

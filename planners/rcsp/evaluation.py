@@ -43,14 +43,15 @@ class Evaluation:
     futures: Futures
     tail: int  # scenarios in it
 
-    def best(self) -> tuple[int, bool]:
+    def best(self, effort: F64) -> tuple[int, bool]:
         """Return the command to ask for, and whether it is free: the best by objective, else, where none is, the least risky.
 
-        Of equally risky ones, the better by reward is not the safer: the objective does not decide between collisions.
+        Of commands that are as risky, the calmest is taken, by `effort`, shape (commands,): progress does not decide between
+        collisions.
         """
         if self.free.any():
             return int(np.argmax(np.where(self.free, self.objective, -np.inf))), True
-        return int(np.argmin(self.risk)), False
+        return int(np.lexsort((effort, np.round(self.risk, 6)))[0]), False
 
 
 class Evaluator:

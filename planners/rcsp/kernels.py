@@ -131,7 +131,10 @@ def clearances(x: F32, y: F32, futures: F32, contact: F32, far_m: float) -> F32:
     clearance = np.full((len(x), n), np.float32(far_m))
     own, best = np.empty((steps, 2, n), np.float32), np.empty(n, np.float32)
     for m in range(obstacles):
-        own[:] = futures[:, m]
+        for k in range(steps):
+            for axis in range(2):
+                for i in range(n):
+                    own[k, axis, i] = futures[k, m, axis, i]
         box, reach = boxes(own), contact[m] + np.float32(far_m)
         for u in range(len(x)):
             best[:] = reach * reach
@@ -150,7 +153,7 @@ def reacting_clearances(x: F32, y: F32, draws: Draws, steps_s: F64, far_m: float
     for u in range(len(x)):
         robot[:, 0], robot[:, 1] = x[u], y[u]
         for m in range(obstacles):
-            advance(draws, m, steps_s, robot, own, 0)
+            advance(draws, m, steps_s, robot, own)
             reach = draws.contact_m[m] + np.float32(far_m)
             best[:] = reach * reach
             if nearest_squared(x[u], y[u], own, boxes(own), reach, best):

@@ -17,7 +17,7 @@ from drivers.interface.seeds import stream
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import F64, Belief
 from planners.planner import Plan, PlannerSetup
-from planners.polyline import arc_length
+from planners.polyline import beginning
 from planners.prediction.conjectures import ConjectureFamily
 from planners.prediction.constant_velocity import ConstantVelocityPredictor
 from planners.prediction.predictor import Predictor
@@ -32,7 +32,7 @@ from planners.router import Route
 from planners.static_field import static_clearance
 from planners.velocity_lattice import Drive, Ground, Rollouts, VelocityLattice, after_latency, roll_out
 
-_SPACING = 3  # points of the route between two that progress is measured along
+_SPACING_M = 0.12  # of the points of the route that progress is measured along
 _ROUTE_SPARE_M = 1.0  # how much farther along than a rollout reaches
 
 
@@ -83,9 +83,9 @@ class Rcsp:
             return Plan(BodyTwist(), diagnostics=said)
         rolled = self._rolled_out(belief)
         reward = self._reward(belief, route, rolled)
-        rng = stream(self._setup.seed, "rcsp", belief.tick)
+        rng = stream(self._setup.seed, "rcsp", belief.tick if self._settings.fresh_draws else 0)
         told = self._evaluator.evaluate(rolled, reward, self._last, scenarios, rng)
-        self._last, free = told.best()
+        self._last, free = told.best(self._lattice.change_from(self._standing))
         return self._plan(belief, rolled, told, free, budget_ns)
 
     def _refusal(self, belief: Belief, route: Route) -> str:
@@ -119,14 +119,21 @@ class Rcsp:
         """Return R of every command, shape (commands,): progress along the route over what full speed makes, less change."""
         s, r = self._settings, self._settings.reward
         reach_m = self._lattice.speed_m_s[-1] * s.step_s * s.steps
-        path = _ahead(route.path_in_odom, reach_m + _ROUTE_SPARE_M)
+        path, along = beginning(route.path_in_odom, reach_m + _ROUTE_SPARE_M, _SPACING_M)
         pose = belief.odom_from_base
-        x, y, yaw = (
-            np.append(part[:, -1], np.float32(here)) for part, here in zip(rolled[:3], (pose.x, pose.y, pose.yaw), strict=True)
+        now = np.array([[pose.x], [pose.y], [pose.yaw]], np.float32)
+        here_m = to_go(now[0], now[1], now[2], path, along, r.lateral, r.heading_m_per_rad, r.look_ahead_m)
+        least_m = np.full(len(self._lattice), np.inf)
+        for k in _judged_at(s.steps):
+            x, y, yaw = (np.ascontiguousarray(part[:, k]) for part in rolled[:3])
+            left_m = to_go(x, y, yaw, path, along, r.lateral, r.heading_m_per_rad, r.look_ahead_m)
+            least_m = np.minimum(least_m, left_m)
+        progress = (here_m - least_m) / reach_m
+        backwards = (
+            np.repeat(np.maximum(-self._lattice.speed_m_s, 0.0), len(self._lattice.turn_rad_s)) / self._lattice.speed_m_s[-1]
         )
-        left = to_go(x, y, yaw, path, arc_length(path), r.lateral, r.heading_m_per_rad, r.look_ahead_m)
-        progress = (left[-1] - left[:-1]) / reach_m
-        return np.asarray(np.clip(progress - r.change * self._lattice.change_from(self._last), -1.0, 1.0))
+        cost = r.reverse * backwards + r.change * self._lattice.change_from(self._last)
+        return np.asarray(np.clip(progress - cost, -1.0, 1.0))
 
     def _plan(self, belief: Belief, rolled: Rollouts, told: Evaluation, free: bool, budget_ns: int | None) -> Plan:
         chosen = self._last
@@ -191,6 +198,15 @@ class Rcsp:
         self._predictor.restore(state["predictor"].tobytes())
 
 
+def _judged_at(steps: int) -> tuple[int, ...]:
+    """Return the steps at which progress is looked at; the best counts, so that who drives through the goal is not late there.
+
+    >>> _judged_at(25)
+    (7, 15, 24)
+    """
+    return steps // 3 - 1, 2 * steps // 3 - 1, steps - 1
+
+
 def _predictor(settings: RcspSettings, robot_radius_m: float) -> Predictor:
     if settings.predictor == "conjectures":
         return ConjectureFamily(settings.prediction, robot_radius_m)
@@ -199,11 +215,3 @@ def _predictor(settings: RcspSettings, robot_radius_m: float) -> Predictor:
         if settings.predictor == "constant_velocity"
         else RandomWalkPredictor(settings.diffusion_m_rt_s)
     )
-
-
-def _ahead(path: F64, length_m: float) -> F64:
-    """Return the beginning of a route, thinned, its end kept, shape (n, 2) with n >= 2."""
-    along = arc_length(path)
-    beginning = path[: max(2, int(np.searchsorted(along, length_m)) + 1)]
-    thinned = beginning[:-1:_SPACING]
-    return np.ascontiguousarray(np.concatenate((thinned, beginning[-1:])) if len(path) > 1 else np.repeat(path, 2, axis=0))

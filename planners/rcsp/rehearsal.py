@@ -39,6 +39,7 @@ def scene(tick: int, *, tracks: bool) -> Belief:
 
 def rehearse(planner: Plans) -> None:
     """Have plans made with and without somebody there."""
-    path = frozen_array(np.stack((np.linspace(0.0, 2.0, 21), np.zeros(21)), axis=1))
+    path = np.stack((np.linspace(0.0, 2.0, 21), np.zeros(21)), axis=1)
     for tick, tracks in enumerate((False, True, True)):
-        planner.plan(scene(tick, tracks=tracks), Route((2.0, 0.0), path, 2.0))
+        for way in (path, frozen_array(path.copy())):
+            planner.plan(scene(tick, tracks=tracks), Route((2.0, 0.0), way, 2.0))

@@ -33,8 +33,9 @@ class RewardSettings(Settings):
     lateral: float = Field(default=0.5, ge=0.0, le=10.0, description="metres of route that a metre beside it costs")
     heading_m_per_rad: float = Field(default=0.15, ge=0.0, le=10.0, description="metres of route that facing away from it costs")
     look_ahead_m: float = Field(default=0.6, gt=0.0, le=10.0, description="how far along the route it should face")
+    reverse: float = Field(default=0.8, ge=0.0, le=10.0, description="metres of route that a metre driven backwards costs")
     change: float = Field(
-        default=0.02, ge=0.0, le=10.0, description="cost of a command as far from the last as standing from full speed"
+        default=0.05, ge=0.0, le=10.0, description="cost of a command as far from the last as standing from full speed"
     )
 
 
@@ -75,6 +76,7 @@ class RcspSettings(Settings):
     stop_before_unknown: bool = Field(default=True, description="a rollout brakes before cells that were never seen")
     body_m: float = Field(default=0.35, ge=0.0, le=2.0, description="but not before those it stands on")
     diffusion_m_rt_s: float = Field(default=0.4, ge=0.0, le=10.0, description="of the random walk")
+    fresh_draws: bool = Field(default=False, description="other random numbers at every tick; else the same for the whole run")
     arrival_m: float = Field(default=0.05, gt=0.0, le=1.0, description="this near the route's end it stands")
     lattice: LatticeSettings = LatticeSettings()
     prediction: PredictionSettings = PredictionSettings()
