@@ -32,6 +32,7 @@ from planners.clearance_manifold.reading import Reader
 from planners.clearance_manifold.ridge_kernels import Ground, Sections
 from planners.clearance_manifold.settings import ClearanceManifoldSettings
 from planners.clearance_manifold.tracker import Category, Continuation, Tracker
+from planners.clearance_manifold.waiting import Waiting
 from planners.clearance_manifold.warm_up import rehearse
 from planners.planner import Plan, PlannerSetup
 from planners.router import Route
@@ -59,6 +60,7 @@ class ClearanceManifold:
         self._reader = Reader(settings, self._stations, self._solver.least_m)
         self._lookout = Lookout(settings.lookout, setup.limits, setup.robot_radius_m, settings.controller.speed_m_s)
         self._controller = ManifoldController(settings.controller, setup.limits)
+        self._waiting = Waiting(settings.waiting, setup.limits.velocity.wz)
         self._chart: Chart | None = None
         self._arc_m = 0.0  # of the robot on the chart
         self._ticks = np.zeros(2, np.int64)  # continued, all
@@ -76,11 +78,8 @@ class ClearanceManifold:
         predicted = self._field.update(belief)
         reason = self._refusal(belief, route)
         if reason:
-            self._chart = None
-            self._tracker.reset()
-            self._lookout.reset()
-            self._asked = BodyTwist()
-            return Plan(BodyTwist(), diagnostics=ManifoldDiagnostics(fallback_category="", stopped=reason))
+            return self._wait(belief, reason, blocked=route.blocked)
+        self._waiting.over()
         pose = belief.odom_from_base
         point = self._control_point(pose)
         new_goal = self._follow_route(route, point)
@@ -98,6 +97,18 @@ class ClearanceManifold:
         """Return the twist a share of the way from the one asked before."""
         last, share = self._asked, self._share
         return BodyTwist(last.vx + share * (twist.vx - last.vx), last.vy + share * (twist.vy - last.vy), twist.wz)
+
+    def _wait(self, belief: Belief, reason: str, *, blocked: bool) -> Plan:
+        """Stand; where the way is blocked, look whether it still is."""
+        self._tracker.reset()
+        self._lookout.reset()
+        self._asked = BodyTwist()
+        diagnostics = ManifoldDiagnostics(fallback_category="", stopped=reason)
+        if not blocked or self._chart is None:
+            self._chart = None
+            return Plan(BodyTwist(), diagnostics=diagnostics)
+        twist = self._waiting.twist(self._chart, self._arc_m, self._settings.solver.horizon_m, self._solver.least_m, belief)
+        return Plan(twist, diagnostics=diagnostics)
 
     def _refusal(self, belief: Belief, route: Route) -> str:
         """Return why there is nothing to do, or nothing."""
@@ -201,6 +212,7 @@ class ClearanceManifold:
             asked=(self._asked.vx, self._asked.vy, self._asked.wz),
             **self._field.state(),
             **self._tracker.state(),
+            **self._waiting.state(),
             **self._lookout.state(),
         )
 
@@ -212,4 +224,5 @@ class ClearanceManifold:
         self._asked = BodyTwist(*state["asked"].tolist())
         self._field.take(state)
         self._tracker.take(state)
+        self._waiting.take(state)
         self._lookout.take(state)

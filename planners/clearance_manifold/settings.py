@@ -128,6 +128,13 @@ class LookoutSettings(Settings):
     reaction_s: float = Field(default=0.2, ge=0.0, le=2.0, description="from what is seen to what the base does")
 
 
+class WaitingSettings(Settings):
+    """While no way is free."""
+
+    patience_s: float = Field(default=6.0, ge=0.0, le=600.0, description="how long it looks at what blocks the way, then around")
+    turn_rad_s: float = Field(default=0.6, gt=0.0, le=6.0, description="how fast it turns meanwhile")
+
+
 class ClearanceManifoldSettings(Settings):
     """The three layers, and the look-out."""
 
@@ -137,3 +144,4 @@ class ClearanceManifoldSettings(Settings):
     tracker: TrackerSettings = TrackerSettings()
     controller: ControllerSettings = ControllerSettings()
     lookout: LookoutSettings = LookoutSettings()
+    waiting: WaitingSettings = WaitingSettings()
