@@ -7,6 +7,7 @@ file says what differs and why.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -29,7 +30,7 @@ from planners.rcsp.kernels import to_go
 from planners.rcsp.rehearsal import rehearse
 from planners.rcsp.settings import RcspSettings
 from planners.router import Route
-from planners.static_field import static_clearance
+from planners.static_field import movers, static_clearance
 from planners.velocity_lattice import Drive, Ground, Rollouts, VelocityLattice, after_latency, roll_out
 
 _SPACING_M = 0.12  # of the points of the route that progress is measured along
@@ -72,6 +73,7 @@ class Rcsp:
         return self._planned(belief, route, budget_ns)
 
     def _planned(self, belief: Belief, route: Route, budget_ns: int | None) -> Plan:
+        belief = replace(belief, tracks=movers(belief))
         self._predictor.observe(belief)
         obstacles, distances = len(self._predictor.seen), len(self._lattice) * self._settings.steps
         reacting = self._settings.reaction == "candidate"

@@ -10,6 +10,7 @@ from drivers.interface.commands import BodyTwist
 from drivers.interface.geometry import SE2
 from drivers.interface.samples import frozen_array
 from estimators.belief import FREE, Belief, ClearanceField, Lattice, OccupancyGrid, Track
+from planners import static_field
 from planners.planner import Plan
 from planners.router import Route
 
@@ -39,6 +40,7 @@ def scene(tick: int, *, tracks: bool) -> Belief:
 
 def rehearse(planner: Plans) -> None:
     """Have plans made with and without somebody there."""
+    static_field.warm_up(scene(0, tracks=False).grid.label)
     path = np.stack((np.linspace(0.0, 2.0, 21), np.zeros(21)), axis=1)
     for tick, tracks in enumerate((False, True, True)):
         for way in (path, frozen_array(path.copy())):

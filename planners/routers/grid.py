@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from drivers.interface.mission import Goal, Mission
+from drivers.interface.samples import frozen_array
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import Belief, Lattice
+from planners import static_field
 from planners.planner import no_path
 from planners.polyline import arc_length, resample
 from planners.router import Route, RouterSetup, goal_yaw
@@ -46,6 +48,7 @@ class GridRouter:
     def warm_up(self) -> None:
         """Compile the path kernel."""
         pull_straight(np.zeros((2, 2)), np.ones((2, 2)))
+        static_field.warm_up(frozen_array(np.zeros((2, 2), np.uint8)))
 
     def route(self, belief: Belief, mission: Mission) -> Route:
         """Return the route in odom, its length being the way to the border and the remainder beyond it."""

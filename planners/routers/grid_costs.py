@@ -10,8 +10,11 @@ from pydantic import Field
 
 from drivers.interface.settings import Settings
 from estimators.belief import UNKNOWN, Belief, Lattice
+from planners.static_field import static_clearance
 
 F64 = NDArray[np.float64]
+
+_OWN_M = 0.1  # occupied cells this near to a track's disc are its own
 
 
 class GridCosts(Settings):
@@ -23,6 +26,9 @@ class GridCosts(Settings):
     nearness_cost: float = Field(4.0, ge=0.0, le=100.0, description="extra cost of a metre right at the margin")
     unknown_cost: float = Field(0.3, ge=0.0, le=100.0, description="extra cost of a metre through unknown cells")
     escape_m: float = Field(0.35, ge=0.0, le=2.0, description="this near the robot, the margin is dear but not forbidden")
+    through_movers: bool = Field(
+        False, description="tracked obstacles that move do not block: passing them is the planner's business"
+    )
     escape_cost: float = Field(20.0, ge=0.0, le=1000.0, description="extra cost of a metre inside the margin there")
 
 
@@ -47,7 +53,8 @@ def cost_grid(belief: Belief, settings: GridCosts, robot_radius_m: float) -> Cos
     rows, columns = (fine.rows - top) // factor, (fine.columns - left) // factor
     cell_m = factor * fine.cell_m
     lattice = Lattice(fine.x_m + left * fine.cell_m, fine.y_m + top * fine.cell_m, cell_m, rows, columns)
-    gap_m = _blocks(belief.clearance.clearance_m, top, left, rows, columns, factor) - robot_radius_m - settings.margin_m
+    clearance_m = static_clearance(belief, _OWN_M) if settings.through_movers else belief.clearance.clearance_m
+    gap_m = _blocks(clearance_m, top, left, rows, columns, factor) - robot_radius_m - settings.margin_m
     unknown = _blocks(belief.grid.label == UNKNOWN, top, left, rows, columns, factor) > 0.5
 
     cost = 1.0 + settings.unknown_cost * unknown

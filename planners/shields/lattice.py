@@ -20,6 +20,7 @@ from planners import static_field
 from planners.planner import Diagnostics, Drawing
 from planners.shield import Filtered, ReachableSet, ShieldSetup
 from planners.shields.lattice_kernels import Local, forecast
+from planners.static_field import movers as movers_of
 from planners.static_field import static_clearance
 from planners.velocity_lattice import LatticeSettings, VelocityLattice
 
@@ -107,7 +108,9 @@ class LatticeShield:
 
     def _forecast(self, belief: Belief, twists: F64) -> tuple[F64, F64, float]:
         s, pose, now, lattice = self._settings, belief.odom_from_base, belief.twist, belief.clearance.lattice
-        movers = [(*track.position_in_odom, *track.velocity_in_odom, track.radius_m + self._radius_m) for track in belief.tracks]
+        movers = [
+            (*track.position_in_odom, *track.velocity_in_odom, track.radius_m + self._radius_m) for track in movers_of(belief)
+        ]
         known = np.array(movers).reshape(-1, 5)
         known = known[np.isfinite(known).all(axis=1)]
         field = static_clearance(belief, s.track_margin_m)
