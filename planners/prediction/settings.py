@@ -29,10 +29,10 @@ class Conjecture(Settings):
     )
     least_speed_m_s: float = Field(default=0.0, ge=0.0, le=5.0, description="speed that pursuit counts with where it stands")
     acceleration_m_s2: float = Field(
-        default=0.1, ge=0.0, le=20.0, description="standard deviation of what changes its velocity, each axis"
+        default=0.05, ge=0.0, le=20.0, description="standard deviation of what changes its velocity, each axis"
     )
-    position_sigma_m: float = Field(default=0.05, gt=0.0, le=1.0, description="least noise of an observed position, each axis")
-    velocity_sigma_m_s: float = Field(default=0.15, gt=0.0, le=5.0, description="least noise of an observed velocity, each axis")
+    position_sigma_m: float = Field(default=0.03, gt=0.0, le=1.0, description="least noise of an observed position, each axis")
+    velocity_sigma_m_s: float = Field(default=0.1, gt=0.0, le=5.0, description="least noise of an observed velocity, each axis")
 
 
 def _conjecture(prior: float, speed_factor: float, **more: float) -> Conjecture:
@@ -43,12 +43,12 @@ class PredictionSettings(Settings):
     """The family Theta of section 4.1 and the stabilised posterior of appendix A."""
 
     family: tuple[Name, ...] = Field(default=FAMILY, min_length=1, description="conjectures in use")
-    static: Conjecture = _conjecture(0.10, 0.0, acceleration_m_s2=0.05)
+    static: Conjecture = _conjecture(0.10, 0.0, acceleration_m_s2=0.02)
     slow: Conjecture = _conjecture(0.15, 0.5)
-    constant: Conjecture = _conjecture(0.40, 1.0)
+    constant: Conjecture = _conjecture(0.45, 1.0)
     fast: Conjecture = _conjecture(0.15, 1.5)
     yielding: Conjecture = _conjecture(0.10, 1.0, slowing=-0.8, pursuit=-0.3)
-    aggressive: Conjecture = _conjecture(0.10, 1.0, slowing=0.25, pursuit=0.75, least_speed_m_s=0.2)
+    aggressive: Conjecture = _conjecture(0.05, 1.0, slowing=0.25, pursuit=0.35, least_speed_m_s=0.2)
     update: bool = Field(default=True, description="false: the weights stay the prior (fixed-predictor RCSP)")
     per_obstacle: bool = Field(
         default=False, description="a posterior for each obstacle in place of one for all, as in the paper"
