@@ -23,7 +23,7 @@ class LiveSource:
         self._context = rs.context()
         found = {each.get_info(rs.camera_info.serial_number): each for each in self._context.query_devices()}
         names = [f"{each.get_info(rs.camera_info.name)} {serial}" for serial, each in found.items()]
-        told = f"connected: {', '.join(names) or 'none'}"
+        told = f"connected: {', '.join(names)}" if names else "none is connected"
         if serial_number and serial_number not in found:
             raise DeviceError(f"{device}: there is no RealSense camera with serial number {serial_number}; {told}")
         if not found:

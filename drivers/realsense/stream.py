@@ -32,7 +32,11 @@ class FrameStamp:
 
 
 class FrameStamps:
-    """Stamps the frames of one stream, and counts those that were lost or came twice."""
+    """Stamps the frames of one stream, and counts those that were lost or came twice.
+
+    A better guess of the clock neither turns time back nor presses frames together: they stay half as far apart as the device
+    says, until the new line is reached.
+    """
 
     def __init__(self, clock: DeviceClock, first: int) -> None:
         """Number from `first`; streams of one sensor share a clock."""
@@ -40,6 +44,7 @@ class FrameStamps:
         self._clock = clock
         self._domain: int | None = None
         self._newest_ns = -(2**62)
+        self._device_ns = 0  # the newest frame's own stamp
         self.repeated = 0
 
     @property
@@ -66,6 +71,9 @@ class FrameStamps:
         if domain != self._domain:  # a camera changes it when it has found out how its clock and the system's belong together
             self._domain = domain
             self._clock.restart()
-        captured_ns = self._clock.to_host(round(frame.get_timestamp() * 1e6), now_ns)
-        self._newest_ns = max(captured_ns, self._newest_ns + 1)  # a better guess of the clock never turns time back
+        device_ns, jumps = round(frame.get_timestamp() * 1e6), self._clock.jumps
+        captured_ns = self._clock.to_host(device_ns, now_ns)
+        apart_ns = device_ns - self._device_ns if self._clock.jumps == jumps else 0
+        self._device_ns = device_ns
+        self._newest_ns = max(captured_ns, self._newest_ns + 1, min(self._newest_ns + apart_ns // 2, now_ns))
         return FrameStamp(min(self._newest_ns, now_ns), now_ns, sequence, domain)

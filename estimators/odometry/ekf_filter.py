@@ -20,6 +20,8 @@ from estimators.odometry.wheel_way import WheelModel, WheelWay, farthest
 Sample = ImuSample | WheelSample | PoseSample
 VELOCITY_STD_M_S = 0.5  # of a velocity of which nothing is known
 LOST_STD = (0.5, 0.5, 0.5)  # m, m, rad: what the pose loses while nothing is sensed for too long
+SPIN_OVER_S = 1e-3  # stamps that a busy host has pressed closer together than this tell no rate of change
+IMPOSSIBLE = 2.0  # times the fastest: a velocity that no shock explains either
 
 
 class MotionFilter:
@@ -85,7 +87,7 @@ class MotionFilter:
         x_m, y_m = self._limits.imu_x_m, self._limits.imu_y_m
         if (x_m == 0.0 and y_m == 0.0) or state.gyro_ns is None or time_ns <= state.gyro_ns:
             return fx, fy
-        spin = (rate - state.rate_rad_s) * SECOND_NS / (time_ns - state.gyro_ns)
+        spin = (rate - state.rate_rad_s) / max((time_ns - state.gyro_ns) / SECOND_NS, SPIN_OVER_S)
         turning = 0.5 * (rate + state.rate_rad_s) - float(state.x[GYRO_BIAS])
         return fx + turning * turning * x_m + spin * y_m, fy + turning * turning * y_m - spin * x_m
 
@@ -234,9 +236,9 @@ class MotionFilter:
         x, covariance = self._algebra.correct(state, innovation, WAY, way.covariance / weight)
         return state._replace(x=x, covariance=covariance)
 
-    def _is_too_fast(self, state: EkfState) -> bool:
+    def _is_too_fast(self, state: EkfState, factor: float = 1.0) -> bool:
         """Whether a correction by a way whose time was wrong has left a velocity that no base has."""
-        return math.hypot(*state.x[VELOCITY].tolist()) > self._limits.speed_max_m_s
+        return math.hypot(*state.x[VELOCITY].tolist()) > factor * self._limits.speed_max_m_s
 
     def _at_speed(self, state: EkfState, way: WheelWay) -> EkfState:
         """Believe the wheels' rates for the velocity, where a gap has left it unknown.
@@ -262,7 +264,7 @@ class MotionFilter:
         """Return the state after a sample if it can be true; else one that begins anew."""
         bias, spread = float(after.x[GYRO_BIAS]) - self._limits.gyro_bias_rad_s, after.covariance.ravel()
         finite = math.isfinite(after.x.dot(after.x) + spread.dot(spread))
-        if finite and abs(bias) <= self._settings.gyro_bias_max_rad_s:
+        if finite and abs(bias) <= self._settings.gyro_bias_max_rad_s and not self._is_too_fast(after, IMPOSSIBLE):
             return after
         fresh = self.start()
         x = fresh.x.copy()
