@@ -90,8 +90,8 @@ class Lookout:
             if creeps:
                 return Outlook(math.inf, s.creep_m_s, look_at, demand, True)
             return Outlook(max(begin, 0.0), math.inf, look_at, demand, True)
-        if not len(found):
-            self._waited_s = 0.0
+        if not len(found):  # an opening that flickers is the same one
+            self._waited_s = max(0.0, self._waited_s - period_s)
         return Outlook(demand_m_s=demand if len(found) else 0.0)
 
     def _look_at(self, when: F64, whence: F64, at: F64, normal: F64, begin: float, end: float) -> F64:

@@ -118,8 +118,8 @@ def openings(when: F64, arcs_m: F64, unseen: Unseen) -> F64:
         unseen: how far off the robot must stay.
 
     Returns:
-        shape (m, 3) [m, m, s], in order; those that meet are one.  Where no wall follows there is no opening but open ground, on
-        which walkers are seen to come.
+        shape (m, 3) [m, m, s], in order; those that meet are one.  What lies behind the robot is past.  Where no wall follows
+        there is no opening but open ground, on which walkers are seen to come.
     """
     n, half = len(arcs_m), 0.5 * (arcs_m[1] - arcs_m[0])
     found, count, i = np.empty((n, 3)), 0, 0
@@ -130,7 +130,7 @@ def openings(when: F64, arcs_m: F64, unseen: Unseen) -> F64:
             i += 1
         if i == first:
             i += 1
-        elif i < n:
+        elif i < n and arcs_m[i - 1] > -half:
             begin, end = arcs_m[first] - half - unseen.apart_m, arcs_m[i - 1] + half + unseen.apart_m
             if count > 0 and begin <= found[count - 1, 1]:
                 found[count - 1, 1], found[count - 1, 2] = end, min(found[count - 1, 2], soonest)

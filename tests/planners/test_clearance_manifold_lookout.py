@@ -117,10 +117,20 @@ def test_what_left_the_view_goes_on_for_a_moment_and_is_dropped_where_it_is_seen
     age = np.ones(field.known.shape, np.float32)
     walker, nobody = np.array([1.0, 0.5, -0.8, 0.2, 9.0]), np.zeros(5)
     memory = ClosingMemory(1.0)
-    memory.update(walker, field, age, 0.1)
+    for step in range(5):
+        memory.update(walker + np.array([0.08 * (4 - step), 0.0, 0.0, 0.0, 0.0]), field, age, 0.1)
     for step in range(1, 10):
         kept = memory.update(nobody, field, age, 0.1)
         assert kept[:2] == pytest.approx([1.0 - 0.08 * step, 0.5 + 0.02 * step])
     assert not memory.update(nobody, field, age, 0.2).any()
-    memory.update(walker, field, age, 0.1)
+    for _ in range(5):
+        memory.update(walker, field, age, 0.1)
     assert not memory.update(nobody, field, 0.0 * age, 0.1).any()
+
+
+def test_what_seemed_to_close_in_for_a_moment_only_is_not_carried_on():
+    field = belief_of([]).clearance
+    age = np.ones(field.known.shape, np.float32)
+    memory = ClosingMemory(1.0)
+    assert memory.update(np.array([1.0, 0.5, -0.8, 0.2, 9.0]), field, age, 0.05).any()
+    assert not memory.update(np.zeros(5), field, age, 0.05).any()
