@@ -12,7 +12,7 @@ class BarrierMpcSettings(Settings):
     reverse_m_s: float = Field(0.2, ge=0.0, le=5.0, description="backwards, to back out; 0: never")
     step_s: float = Field(0.1, gt=0.0, le=1.0, description="of the prediction")
     steps: int = Field(20, ge=3, le=60, description="of the prediction (N)")
-    iterations: int = Field(2, ge=1, le=10, description="quadratic programs for one decision")
+    iterations: int = Field(1, ge=1, le=10, description="quadratic programs for one decision")
     barrier_rate_per_s: float = Field(
         2.0, gt=0.0, le=50.0, description="how fast a barrier may fall; gamma is 1 - exp(-rate step)"
     )
@@ -28,5 +28,5 @@ class BarrierMpcSettings(Settings):
     weight_turn: float = Field(0.1, ge=0.0, le=1e4, description="of the squared rate [s^2/rad^2]")
     weight_change: float = Field(0.5, ge=0.0, le=1e4, description="of the squared change of the inputs between steps")
     weight_slack: float = Field(200.0, gt=0.0, le=1e6, description="of a metre by which barriers fall too fast, at a step")
-    solver_iterations: int = Field(200, ge=10, le=4000, description="of OSQP, for one quadratic program")
+    solver_iterations: int = Field(160, ge=10, le=4000, description="of OSQP, for one quadratic program")
     arrival_m: float = Field(0.05, gt=0.0, le=1.0, description="this near the route's end the robot stands")

@@ -112,8 +112,8 @@ def beyond(value: float, low: float, high: float) -> tuple[float, float]:
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def add(normal: Normal, unknowns: Indices, slope: F64, residual: float, weight: float) -> float:
-    """Add a penalty, with its derivatives by some unknowns, shapes (k,), to the equations; return its cost."""
+def add(normal: Normal, unknowns: Indices, slope: F64, sign: float, residual: float, weight: float) -> float:
+    """Add a penalty, with `sign` times its derivatives by some unknowns, shapes (k,), to the equations; return its cost."""
     if residual == 0.0 or weight == 0.0:
         return 0.0
     if len(normal.gradient) > 0:
@@ -121,10 +121,25 @@ def add(normal: Normal, unknowns: Indices, slope: F64, residual: float, weight: 
             i = unknowns[p]
             if i < 0 or slope[p] == 0.0:
                 continue
-            normal.gradient[i] += weight * slope[p] * residual
+            normal.gradient[i] += weight * sign * slope[p] * residual
             for q in range(len(unknowns)):
                 if 0 <= unknowns[q] <= i:
                     normal.matrix[i, i - unknowns[q]] += weight * slope[p] * slope[q]
+    return weight * residual * residual
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def add_at_pose(normal: Normal, i: int, slope_x: float, slope_y: float, residual: float, weight: float) -> float:
+    """Add a penalty of where pose i is, with its derivatives by x and y; return its cost."""
+    if residual == 0.0 or weight == 0.0:
+        return 0.0
+    if len(normal.gradient) > 0:
+        x, y = 4 * i - 3, 4 * i - 2
+        normal.gradient[x] += weight * slope_x * residual
+        normal.gradient[y] += weight * slope_y * residual
+        normal.matrix[x, 0] += weight * slope_x * slope_x
+        normal.matrix[y, 0] += weight * slope_y * slope_y
+        normal.matrix[y, 1] += weight * slope_x * slope_y
     return weight * residual * residual
 
 
@@ -141,10 +156,13 @@ def segments_of(poses: F64, times: F64) -> Segments:
         c, s = np.cos(middle), np.sin(middle)
         f, left = c * dx + s * dy, c * dy - s * dx
         forward[i], sideways[i] = f, left
-        forward_slope[i, :6] = np.array([-c, -s, 0.5 * left, c, s, 0.5 * left])
-        sideways_slope[i, :6] = np.array([s, -c, -0.5 * f, -s, c, -0.5 * f])
+        forward_slope[i, 0], forward_slope[i, 1], forward_slope[i, 3], forward_slope[i, 4] = -c, -s, c, s
+        forward_slope[i, 2], forward_slope[i, 5] = 0.5 * left, 0.5 * left
+        sideways_slope[i, 0], sideways_slope[i, 1], sideways_slope[i, 3], sideways_slope[i, 4] = s, -c, -s, c
+        sideways_slope[i, 2], sideways_slope[i, 5] = -0.5 * f, -0.5 * f
         twist[i, 0], twist[i, 1] = f / time, turn / time
-        twist_slope[i, 0] = forward_slope[i] / time
+        for k in range(6):
+            twist_slope[i, 0, k] = forward_slope[i, k] / time
         twist_slope[i, 0, 6] = -f / time**2
         twist_slope[i, 1, 2], twist_slope[i, 1, 5], twist_slope[i, 1, 6] = -1.0 / time, 1.0 / time, -turn / time**2
         unknowns[i, 6] = 4 * i
@@ -163,14 +181,14 @@ def add_motion(normal: Normal, seg: Segments, times: F64, bounds: Bounds, weight
     by_time[6] = 1.0
     for i in range(len(times)):
         at = seg.unknowns[i]
-        cost += add(normal, at, by_time, times[i], weights.time)
-        cost += add(normal, at, seg.sideways_slope[i], seg.sideways[i], weights.sideways)
+        cost += add(normal, at, by_time, 1.0, times[i], weights.time)
+        cost += add(normal, at, seg.sideways_slope[i], 1.0, seg.sideways[i], weights.sideways)
         residual, sign = beyond(seg.forward[i], 0.0, np.inf)
-        cost += add(normal, at, sign * seg.forward_slope[i], residual, weights.forward)
+        cost += add(normal, at, seg.forward_slope[i], sign, residual, weights.forward)
         residual, sign = beyond(seg.twist[i, 0], min(eps - bounds.reverse_m_s, 0.0), bounds.speed_m_s - eps)
-        cost += add(normal, at, sign * seg.twist_slope[i, 0], residual, weights.speed)
+        cost += add(normal, at, seg.twist_slope[i, 0], sign, residual, weights.speed)
         residual, sign = beyond(seg.twist[i, 1], eps - bounds.rate_rad_s, bounds.rate_rad_s - eps)
-        cost += add(normal, at, sign * seg.twist_slope[i, 1], residual, weights.rate)
+        cost += add(normal, at, seg.twist_slope[i, 1], sign, residual, weights.rate)
     return cost
 
 
@@ -184,12 +202,15 @@ def add_acceleration(
     for i in range(last):
         span = 0.5 * (times[i] + times[i + 1])
         value = (seg.twist[i + 1, axis] - seg.twist[i, axis]) / span
-        unknowns[:7], unknowns[7:] = seg.unknowns[i], seg.unknowns[i + 1]
-        slope[:7], slope[7:] = -seg.twist_slope[i, axis] / span, seg.twist_slope[i + 1, axis] / span
+        residual, sign = beyond(value, -limit, limit)
+        if residual == 0.0:
+            continue
+        for k in range(7):
+            unknowns[k], unknowns[7 + k] = seg.unknowns[i, k], seg.unknowns[i + 1, k]
+            slope[k], slope[7 + k] = -seg.twist_slope[i, axis, k] / span, seg.twist_slope[i + 1, axis, k] / span
         slope[6] -= 0.5 * value / span
         slope[13] -= 0.5 * value / span
-        residual, sign = beyond(value, -limit, limit)
-        cost += add(normal, unknowns, sign * slope, residual, weight)
+        cost += add(normal, unknowns, slope, sign, residual, weight)
     now = ends.speed_m_s if axis == 0 else ends.rate_rad_s
     cost += _add_end(normal, seg, times, 0, axis, now, limit, weight)
     if ends.stops:
@@ -206,54 +227,54 @@ def _add_end(
     slope = seg.twist_slope[i, axis] / times[i]
     slope[6] -= value / times[i]
     residual, sign = beyond(value, -limit, limit)
-    return float(add(normal, seg.unknowns[i], sign * slope, residual, weight))
+    return float(add(normal, seg.unknowns[i], slope, sign, residual, weight))
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _add_gap(
-    normal: Normal, at: Indices, gap: F64, least: float, weight: float, inflation: float, small: float
-) -> float:  # fmt: skip
-    """Add the penalties of a gap, its value and its derivatives by x and y, shape (3,); return their cost."""
-    cost: float = add(normal, at, -gap[1:], max(least - gap[0], 0.0), weight)
-    cost += add(normal, at, -gap[1:], max(inflation - gap[0], 0.0), small)
+def add_standing(normal: Normal, poses: F64, scene: Scene, bounds: Bounds, weights: Weights) -> float:
+    """Add the gaps of every free pose to what stands; return their cost."""
+    cost, least = 0.0, bounds.least_gap_m + bounds.epsilon
+    for i in range(1, len(poses) - 1):
+        clearance, dx, dy = bilinear_gradient(
+            scene.clearance, scene.corner_x, scene.corner_y, scene.cell_m, poses[i, 0], poses[i, 1]
+        )
+        gap = clearance - scene.body_m
+        cost += add_at_pose(normal, i, -dx, -dy, max(least - gap, 0.0), weights.obstacle)
+        cost += add_at_pose(normal, i, -dx, -dy, max(bounds.inflation_m - gap, 0.0), weights.inflation)
     return cost
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def add_obstacles(
-    normal: Normal, poses: F64, passed_s: F64, scene: Scene, bounds: Bounds, weights: Weights
-) -> float:  # fmt: skip
-    """Add the gaps of every free pose to what stands, and to what moves, where it is when the robot passes; return their cost."""
-    cost, gap, least = 0.0, np.empty(3), bounds.least_gap_m + bounds.epsilon
+def add_moving(normal: Normal, poses: F64, passed_s: F64, scene: Scene, bounds: Bounds, weights: Weights) -> float:
+    """Add the gaps of every free pose to what moves, where it is when the robot passes; return their cost."""
+    cost, least = 0.0, bounds.least_gap_m + bounds.epsilon
     for i in range(1, len(poses) - 1):
-        at = np.array([4 * i - 3, 4 * i - 2])
-        x, y = poses[i, 0], poses[i, 1]
-        gap[0], gap[1], gap[2] = bilinear_gradient(scene.clearance, scene.corner_x, scene.corner_y, scene.cell_m, x, y)
-        gap[0] -= scene.body_m
-        cost += _add_gap(normal, at, gap, least, weights.obstacle, bounds.inflation_m, weights.inflation)
         for j in range(len(scene.centre)):
-            dx = x - scene.centre[j, 0] - passed_s[i] * scene.velocity[j, 0]
-            dy = y - scene.centre[j, 1] - passed_s[i] * scene.velocity[j, 1]
+            dx = poses[i, 0] - scene.centre[j, 0] - passed_s[i] * scene.velocity[j, 0]
+            dy = poses[i, 1] - scene.centre[j, 1] - passed_s[i] * scene.velocity[j, 1]
             apart = max(np.hypot(dx, dy), 1e-9)
-            gap[0], gap[1], gap[2] = apart - scene.radius_m[j] - scene.body_m, dx / apart, dy / apart
-            cost += _add_gap(normal, at, gap, least, weights.moving, bounds.moving_inflation_m, weights.moving_inflation)
+            gap = apart - scene.radius_m[j] - scene.body_m
+            cost += add_at_pose(normal, i, -dx / apart, -dy / apart, max(least - gap, 0.0), weights.moving)
+            residual = max(bounds.moving_inflation_m - gap, 0.0)
+            cost += add_at_pose(normal, i, -dx / apart, -dy / apart, residual, weights.moving_inflation)
     return cost
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def add_via(normal: Normal, poses: F64, nearest: Indices, scene: Scene, weights: Weights) -> float:
     """Add the distances of the points to pass by to their poses, by index, shape (k,); return their cost."""
-    cost, one = 0.0, np.ones(1)
+    cost = 0.0
     for k in range(len(scene.via)):
-        for axis in range(2):
-            at = np.array([4 * nearest[k] - 3 + axis])
-            cost += add(normal, at, one, poses[nearest[k], axis] - scene.via[k, axis], weights.via)
+        i = nearest[k]
+        if i > 0:
+            cost += add_at_pose(normal, i, 1.0, 0.0, poses[i, 0] - scene.via[k, 0], weights.via)
+            cost += add_at_pose(normal, i, 0.0, 1.0, poses[i, 1] - scene.via[k, 1], weights.via)
     return cost
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def nearest_poses(poses: F64, points: F64) -> Indices:
-    """Return the free pose nearest to each point, shape (k,); a band of two poses has none, then 0 (which is fixed)."""
+    """Return the free pose nearest to each point, shape (k,); 0, which is fixed, in a band that has none."""
     nearest = np.zeros(len(points), np.int64)
     for k in range(len(points)):
         best = np.inf
@@ -279,6 +300,7 @@ def evaluated(
     cost = add_motion(normal, seg, times, bounds, weights)
     cost += add_acceleration(normal, seg, times, ends, 0, bounds.acceleration_m_s2, weights.acceleration)
     cost += add_acceleration(normal, seg, times, ends, 1, bounds.acceleration_rad_s2, weights.turning)
-    cost += add_obstacles(normal, poses, passed_s, scene, bounds, weights)
+    cost += add_standing(normal, poses, scene, bounds, weights)
+    cost += add_moving(normal, poses, passed_s, scene, bounds, weights)
     cost += add_via(normal, poses, nearest, scene, weights)
     return cost, normal

@@ -13,7 +13,7 @@ from planners.teb.kernels import BANDWIDTH, F64, Bounds, Ends, Scene, Weights, e
 
 _SHORTEST_S = 1e-3  # between two poses
 _START_DAMPING = 1e-4  # of the largest element of the diagonal
-_SETTLED = 1e-3  # an iteration that takes off less of the cost is the last of its round
+_SETTLED = 3e-3  # an iteration that takes off less of the cost is the last of its round
 _LONGEST_STEP = 0.25  # of any unknown [m, rad, s]: beyond it the penalties are not what they look like here
 
 
