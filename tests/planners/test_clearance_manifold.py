@@ -200,3 +200,18 @@ def test_gives_way_behind_who_crosses_instead_of_driving_in_front():
     assert (
         asked[0].vx + asked[0].vy < 0.0 < asked[1].vx + asked[1].vy
     )  # along the miss vector, which points ahead and to the left
+
+
+@pytest.mark.parametrize(
+    "path",
+    [np.zeros((1, 2)), np.zeros((4, 2)), np.array([[0.0, 0.0], [0.0, 1e-9], [2.0, 0.0]])],
+    ids=["point", "standing", "double"],
+)
+def test_a_route_without_a_corridor_to_lay_leads_straight_to_the_goal_or_nowhere(path):
+    planner = planner_of()
+    for tick in range(3):
+        plan = planner.plan(at(tick), Route((2.0, 0.0), path, 2.0))
+        assert plan.base.finite
+        assert plan.diagnostics.p6
+        assert abs(plan.base.vy) < 0.05
+    assert np.abs(plan.path_in_odom[:, 1]).max() < 0.1
