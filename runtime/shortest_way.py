@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.polyline import arc_length
-from planners.routers.grid_graph import GridGraph, trace
+from planners.routers.grid import graph_of
+from planners.routers.grid_graph import trace
 from planners.routers.grid_kernels import pull_straight
 from runtime.floor_plan import FloorPlan
 from sim_drivers.scene import Scene
 
 F64 = NDArray[np.float64]
 CELL_M = 0.05
-MARGIN_M = 1.0  # searched beyond all that stands
+MARGIN_M = 1.0  # searched beyond a disc that touches what stands
 
 
 def shortest_way_m(scene: Scene, radius_m: float) -> float:
@@ -37,15 +38,22 @@ class _Free:
     def __init__(self, scene: Scene, places: F64, radius_m: float) -> None:
         solids = tuple((obstacle.shape, obstacle.map_from_shape) for obstacle in scene.static)
         reaches = np.array([(pose.x, pose.y, shape.bounding_radius_m) for shape, pose in solids]).reshape(-1, 3)
-        low = np.vstack((places, reaches[:, :2] - reaches[:, 2:])).min(axis=0) - MARGIN_M
-        high = np.vstack((places, reaches[:, :2] + reaches[:, 2:])).max(axis=0) + MARGIN_M
+        low = np.vstack((places, reaches[:, :2] - reaches[:, 2:])).min(axis=0) - radius_m - MARGIN_M
+        high = np.vstack((places, reaches[:, :2] + reaches[:, 2:])).max(axis=0) + radius_m + MARGIN_M
         columns, rows = np.ceil((high - low) / CELL_M).astype(int).tolist()
         self._corner = low
-        x, y = (self._corner[axis] + CELL_M * np.arange(count) for axis, count in ((0, columns), (1, rows)))
-        points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-        blocked = FloorPlan(solids).distance_m(points) < radius_m if solids else np.zeros(len(points), dtype=np.bool_)
-        self._cost = np.where(blocked, np.inf, 1.0).reshape(rows, columns)
-        self._graph = GridGraph(rows, columns, CELL_M)
+        self._cost = np.ones((rows, columns))
+        for (x, y, bounding_m), solid in zip(reaches.tolist(), solids, strict=True):
+            self._block(FloorPlan((solid,)), np.array([x, y]), bounding_m + radius_m, radius_m)
+        self._graph = graph_of(rows, columns, CELL_M)
+
+    def _block(self, plan: FloorPlan, middle: F64, within_m: float, radius_m: float) -> None:
+        """Block the places that are too near to one solid, all of which lie within a square around its middle."""
+        first, last = (np.rint((middle + side * within_m - self._corner) / CELL_M).astype(int) for side in (-1, 1))
+        columns, rows = (np.arange(a, b + 1) for a, b in zip(np.maximum(first, 0), last, strict=True))
+        x, y = np.meshgrid(self._corner[0] + CELL_M * columns, self._corner[1] + CELL_M * rows)
+        near = plan.distance_m(np.stack((x, y), axis=-1).reshape(-1, 2)).reshape(x.shape) < radius_m
+        self._cost[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1][near] = np.inf
 
     def way_m(self, start: tuple[float, float], goal: tuple[float, float]) -> float:
         here, there = self._node(start), self._node(goal)
