@@ -34,7 +34,7 @@ class DynaBarnSettings(Settings):
     lead_s: float = Field(
         default=0.0, ge=0.0, le=600.0, description="the discs have been on their way for up to so long, drawn by the seed"
     )
-    goal_tolerance_m: float = Field(default=0.45, gt=0.0, le=5.0, description="how near the goal counts as reached")
+    goal_tolerance_m: float = Field(default=0.25, gt=0.0, le=5.0, description="how near the goal counts as reached")
     time_limit_s: float = Field(default=100.0, gt=0.0, le=600.0, description="when the run is given up")
 
 
