@@ -25,6 +25,7 @@ from planners.orca.motion import motion_of
 from planners.orca.settings import ReciprocalAvoidanceSettings
 from planners.orca.velocity_obstacles import agent_half_planes, standing_half_planes
 from planners.planner import Diagnostics, Drawing, Plan, PlannerSetup
+from planners.polyline import resample
 from planners.router import Route
 from planners.shields.plane_qp import feasible_polygon
 from planners.standing import Discs, StandingWorld, boundary_points, standing_world
@@ -32,6 +33,7 @@ from planners.standing import Discs, StandingWorld, boundary_points, standing_wo
 F64 = NDArray[np.float64]
 
 _DRAWN_AGENTS = 6
+_CARROT_STEP_M = 0.1  # between points of the route that may be aimed at
 _NO_LABEL = frozen_array(np.zeros((1, 1), np.uint8))  # of the ground that is looked across; what was never seen hides nothing
 
 
@@ -116,7 +118,8 @@ class ReciprocalAvoidance:
         """Return the velocity, shape (2,), in the body frame, towards the farthest point of the route that can be seen."""
         s, lattice, here = self._settings, world.lattice, np.array([[pose.x, pose.y]])
         nearest = int(np.argmin(np.hypot(*(route.path_in_odom - here).T)))
-        path = np.concatenate((here, route.path_in_odom[min(nearest + 1, len(route.path_in_odom) - 1) :]))
+        rest = route.path_in_odom[min(nearest + 1, len(route.path_in_odom) - 1) :]
+        path = resample(np.concatenate((here, rest)), _CARROT_STEP_M)
         room_m = min(self._setup.robot_radius_m + s.margin_m, float(world.clearance_at(here)[0]))
         ground = Surroundings(world.clearance_m, _NO_LABEL, lattice.x_m, lattice.y_m, lattice.cell_m, room_m, -1.0)
         carrot = pose.inverse().apply(path[visible_along(path, s.look_ahead_m, ground)])
