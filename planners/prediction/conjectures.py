@@ -96,9 +96,9 @@ class ConjectureFamily:
         if not s.update:
             return
         if s.per_obstacle:
-            self._posterior = updated(self._posterior, log_likelihood.T, s.temperature, s.floor)
+            self._posterior = updated(self._posterior, np.ascontiguousarray(log_likelihood.T), s.temperature, s.floor)
         else:
-            self._shared = updated(self._shared, log_likelihood.sum(axis=1), s.temperature, s.floor)
+            self._shared = updated(self._shared[None], log_likelihood.sum(axis=1)[None], s.temperature, s.floor)[0]
 
     def draw(self, steps: int, scenarios: int, rng: np.random.Generator) -> tuple[Draws, NDArray[np.int64]]:
         """Return where the scenarios start and what drives them on, and the conjecture of each, shape (obstacles, scenarios)."""

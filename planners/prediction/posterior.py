@@ -11,24 +11,38 @@ from numba import njit
 from estimators.belief import F64
 
 
-def updated(weights: F64, log_likelihood: F64, temperature: float, floor: float) -> F64:
-    """Return q_t proportional to q_{t-1} l_t^(1/tau), then floored; shapes (..., conjectures).
-
-    >>> updated(np.array([0.5, 0.5]), np.log([0.8, 0.2]), 1.0, 0.0).round(3).tolist()
-    [0.8, 0.2]
-    """
-    log_weights = np.log(np.maximum(weights, np.finfo(np.float64).tiny)) + log_likelihood / temperature
-    raised = np.exp(log_weights - log_weights.max(axis=-1, keepdims=True))
-    return floored(raised / raised.sum(axis=-1, keepdims=True), floor)
-
-
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def floored(weights: F64, floor: float) -> F64:
-    """Return weights none of which is below the floor: what they have above it is shared out in the same proportion.
+    """Return weights, shape (conjectures,), none of which is below the floor; the others keep their proportions.
 
-    >>> floored(np.array([1.0, 0.0]), 0.1).tolist()
-    [0.9, 0.1]
+    What is above the floor already is left alone: the floor is no forgetting, however often it is applied.
+
+    >>> floored(np.array([0.7, 0.3, 0.0]), 0.1).round(3).tolist()
+    [0.63, 0.27, 0.1]
     """
-    return np.asarray(floor + (1.0 - weights.shape[-1] * floor) * weights)
+    raised = weights.copy()
+    for _ in range(len(weights)):  # lowering the others may bring one of them below the floor
+        low = raised <= floor
+        share = (1.0 - floor * low.sum()) / max(raised[~low].sum(), 1e-300)
+        raised = np.where(low, floor, share * raised)
+        if not (raised < floor).any():
+            break
+    return raised
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def updated(weights: F64, log_likelihood: F64, temperature: float, floor: float) -> F64:
+    """Return q_t proportional to q_{t-1} l_t^(1/tau), then floored; shapes (rows, conjectures).
+
+    >>> updated(np.array([[0.5, 0.5]]), np.log([[0.8, 0.2]]), 1.0, 0.0).round(3).tolist()
+    [[0.8, 0.2]]
+    """
+    posterior = np.empty(weights.shape)
+    for row in range(len(weights)):
+        log_weights = np.log(np.maximum(weights[row], 1e-300)) + log_likelihood[row] / temperature
+        raised = np.exp(log_weights - log_weights.max())
+        posterior[row] = floored(raised / raised.sum(), floor)
+    return posterior
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -1,0 +1,106 @@
+"""The lattice filter: what is safe passes unchanged, what is not is replaced inside what can be reached."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivers.interface.commands import BodyTwist
+from drivers.interface.samples import frozen_array
+from estimators.belief import Track
+from planners.planner import PlannerSetup
+from planners.point_ds.planner import PointAttractor
+from planners.router import RouterSetup
+from planners.routers.straight import StraightRouter
+from planners.shield import ShieldSetup
+from planners.shields.lattice import LatticeShield
+from planners.shields.lattice_kernels import Local, forecast
+from tests.planners.synthetic import DIFFERENTIAL, OMNI, Box, Disc, belief_of, command_of, drive, reachable_from
+
+PERIOD_S, RADIUS_M = 0.05, 0.25
+AHEAD = BodyTwist(0.5, 0.0, 0.0)
+
+
+def shield_of(limits=DIFFERENTIAL, **settings):
+    return LatticeShield(LatticeShield.Settings.model_validate(settings), ShieldSetup(PERIOD_S, RADIUS_M, limits))
+
+
+def filtered(obstacles, asked=AHEAD, twist=AHEAD, limits=DIFFERENTIAL, tracks=(), **settings):
+    belief = replace(belief_of(obstacles, twist=twist), tracks=tracks)
+    return shield_of(limits, **settings).filter(command_of(asked), belief, reachable_from(twist, limits, PERIOD_S))
+
+
+def coming(x, vx, radius=0.25):
+    return Track(0, (x, 0.0), (vx, 0.0), radius, frozen_array(np.zeros((4, 4))))
+
+
+@pytest.mark.parametrize("limits", [DIFFERENTIAL, OMNI], ids=["differential", "omni"])
+@pytest.mark.parametrize("asked", [AHEAD, BodyTwist(0.5, 0.0, 0.15), BodyTwist()])
+def test_what_is_safe_passes_unchanged(asked, limits):
+    result = filtered([Disc(4.0, 0.0, 0.25)], asked, limits=limits)
+    assert result.command.base == reachable_from(AHEAD, limits, PERIOD_S).clip(asked)
+    assert result.diagnostics.asked_feasible
+
+
+@pytest.mark.parametrize("limits", [DIFFERENTIAL, OMNI], ids=["differential", "omni"])
+def test_it_brakes_or_turns_before_a_wall(limits):
+    result = filtered([Box(0.6, -3, 1.0, 3)], limits=limits)
+    assert result.intervened
+    assert not result.diagnostics.asked_feasible
+    assert result.command.base.vx < 0.5
+
+
+def test_it_sees_by_its_velocity_who_will_be_in_the_way():
+    assert filtered([], tracks=(coming(1.6, 0.5),)).diagnostics.asked_feasible
+    assert not filtered([], tracks=(coming(1.6, -0.8),)).diagnostics.asked_feasible
+
+
+def test_the_cells_of_a_track_go_with_it():
+    """A disc that drives ahead of the robot as fast as the robot is no wall."""
+    obstacle = Disc(0.8, 0.0, 0.25, 0.6, 0.0)
+    assert filtered([obstacle], tracks=(coming(0.8, 0.6),)).diagnostics.asked_feasible
+    assert not filtered([obstacle]).diagnostics.asked_feasible
+
+
+def test_of_the_margin_a_rollout_takes_no_more_than_its_share():
+    """It drives 0.6 m of the way to a wall 0.9 m off; a gain of 0.6 would allow 0.51 m."""
+    wall = [Box(RADIUS_M + 0.9, -3, 3.0, 3)]
+    assert filtered(wall, gain=1.0).diagnostics.asked_feasible
+    assert not filtered(wall, gain=0.6).diagnostics.asked_feasible
+
+
+@pytest.mark.parametrize("limits", [DIFFERENTIAL, OMNI], ids=["differential", "omni"])
+@pytest.mark.parametrize(
+    "obstacles",
+    [[Box(-9, -9, 9, 9)], [Disc(0.1, 0.0, 0.2)], [Disc(0.3, 0.0, 0.2), Disc(-0.3, 0.0, 0.2)]],
+    ids=["walled in", "on it", "wedged"],
+)
+def test_where_nothing_is_feasible_it_says_so_and_does_not_press_on(obstacles, limits):
+    result = filtered(obstacles, twist=BodyTwist(), limits=limits)
+    assert result.diagnostics.infeasible
+    assert result.diagnostics.enclosed
+    assert result.command.base.vx <= 0.0
+    assert result.command.base.finite
+
+
+def test_a_track_that_is_not_finite_is_left_out():
+    assert filtered([], tracks=(coming(math.nan, 0.0), coming(1.0, math.inf))).command.base.finite
+
+
+def test_a_planner_that_sees_nothing_does_not_collide_under_it():
+    setup = PlannerSetup(PERIOD_S, RADIUS_M, OMNI, 0)
+    planner = PointAttractor(PointAttractor.Settings(), setup)
+    router = StraightRouter(StraightRouter.Settings(), RouterSetup(PERIOD_S, RADIUS_M))
+    trace = drive(planner, router, shield_of(OMNI), [Disc(1.5, 0.02, 0.3)], (3.0, 0.0), radius_m=RADIUS_M, duration_s=12.0)
+    assert trace.min_clearance_m > 0.0
+    assert trace.poses[-1].x > 0.5
+
+
+def test_the_forecast_is_the_motion_of_a_base_that_answers_late():
+    """From rest to 0.5 m/s at 1 m/s^2 after a latency: 0.125 m while speeding up, then 0.5 m/s."""
+    local = Local(np.full((3, 3), 9.0, np.float32), -1.0, -1.0, 1.0, np.zeros((0, 5)), 0.2, 5.0)
+    twists = np.array([[0.5, 0.0, 0.0]])
+    _, end, here = forecast(np.zeros(3), np.zeros(3), twists, np.ones(3), 0.3, 0.0, 0.001, 2000, local)
+    assert end[0] == pytest.approx([0.125 + 0.5 * 1.5, 0.0], abs=1e-3)
+    assert here == 5.0
