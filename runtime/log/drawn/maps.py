@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from estimators.belief import FREE, OCCUPIED, ClearanceField, Lattice, OccupancyGrid
 
 CLEARANCE_SHOWN_M = 1.5  # the last colour; further away looks the same
-_GRID_Z_M, _CLEARANCE_Z_M = 0.002, 0.004
+RATE_SHOWN_M_S, RATE_STILL_M_S = 1.0, 0.1  # the last colours; what changes more slowly is transparent
+_GRID_Z_M, _CLEARANCE_Z_M, _RATE_Z_M = 0.002, 0.004, 0.006
 _OPACITY = 0.99  # at 1 the viewer would not blend, and paint what is transparent black
 _RGBA8 = rr.components.ImageFormat
 
@@ -27,6 +28,15 @@ def clearance_columns(fields: list[ClearanceField]) -> rr.ComponentColumnList:
         level = np.clip(field.clearance_m * (255.0 / CLEARANCE_SHOWN_M), 0.0, 255.0).astype(np.uint8)
         pictures.append(np.where(field.known, _CLEARANCE_RGBA[level], np.uint32(0)))
     return _columns([field.lattice for field in fields], pictures, _CLEARANCE_Z_M)
+
+
+def rate_columns(fields: list[ClearanceField]) -> rr.ComponentColumnList:
+    """Return the pictures of clearance rates: where it closes red, where it opens blue, where it is still nothing."""
+    pictures = []
+    for field in fields:
+        level = np.clip(field.rate_m_s * (127.0 / RATE_SHOWN_M_S) + 128.0, 0.0, 255.0).astype(np.uint8)
+        pictures.append(_RATE_RGBA[level])
+    return _columns([field.lattice for field in fields], pictures, _RATE_Z_M)
 
 
 def _columns(lattices: list[Lattice], pictures: list[NDArray[np.uint32]], z_m: float) -> rr.ComponentColumnList:
@@ -57,5 +67,16 @@ def _clearance_colours() -> NDArray[np.uint32]:
     return _packed(np.concatenate((rgb, np.full((256, 1), 255, np.uint8)), axis=1).astype(np.uint8))
 
 
+def _rate_colours() -> NDArray[np.uint32]:
+    rate = (np.arange(256) - 128.0) * (RATE_SHOWN_M_S / 127.0)
+    rgba = np.zeros((256, 4), np.uint8)
+    rgba[rate < -RATE_STILL_M_S] = (230, 60, 60, 0)
+    rgba[rate > RATE_STILL_M_S] = (70, 130, 240, 0)
+    moves = np.abs(rate) > RATE_STILL_M_S
+    rgba[moves, 3] = np.clip(80.0 + 175.0 * np.abs(rate[moves]) / RATE_SHOWN_M_S, 0.0, 255.0)
+    return _packed(rgba)
+
+
 _LABEL_RGBA = _label_colours()
+_RATE_RGBA = _rate_colours()
 _CLEARANCE_RGBA = _clearance_colours()

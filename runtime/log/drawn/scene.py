@@ -15,7 +15,7 @@ from drivers.interface.samples import ColourFrame, Intrinsics
 from runtime.cycle import Cycle
 from runtime.log.drawn import arm, colours, shapes, tracks
 from runtime.log.drawn.layers import EQUAL, IDENTICAL, Layer, Rows, Static
-from runtime.log.drawn.maps import clearance_columns, grid_columns
+from runtime.log.drawn.maps import clearance_columns, grid_columns, rate_columns
 from runtime.log.exact import rvl
 from runtime.log.header import RunHeader
 from runtime.log.settings import LogSettings
@@ -52,6 +52,7 @@ def layers(header: RunHeader, settings: LogSettings) -> list[Layer[Any]]:
         Layer(lambda c: c.sensed.colour, Rows(COLOUR, _pictures)),
         Layer(lambda c: c.belief.grid, Rows(f"{ODOM}/grid", grid_columns), IDENTICAL, often),
         Layer(lambda c: c.belief.clearance, Rows(f"{ODOM}/clearance", clearance_columns), IDENTICAL, often),
+        Layer(lambda c: c.belief.clearance, Rows(f"{ODOM}/rate", rate_columns), IDENTICAL, often),
         Layer(lambda c: c.route.path_in_odom, path(f"{ODOM}/route", colours.ROUTE, 0.012), IDENTICAL, often),
         Layer(lambda c: c.plan.path_in_odom, path(f"{ODOM}/plan", colours.ASKED, 0.02), IDENTICAL, often),
         Layer(lambda c: c.sensed.mission.goals, _goals(f"{MAP}/goals"), EQUAL),

@@ -33,13 +33,13 @@ def layout(header: RunHeader) -> rrb.Horizontal:
 
 
 def _scene(header: RunHeader) -> rrb.Spatial3DView:
-    contents = [f"{scene.MAP}/**", scene.DEPTH, f"- {scene.ODOM}/clearance", f"- {scene.MAP}/truth"]
+    contents = [f"{scene.MAP}/**", scene.DEPTH, f"- {scene.ODOM}/clearance", f"- {scene.ODOM}/rate", f"- {scene.MAP}/truth"]
     eye = _BESIDE if header.arm is not None and "base" not in header.devices else _BEHIND
     return views.scene("Scene", scene.MAP, contents, scene.FOCUS, eye, [f"{scene.MAP}/trail"])
 
 
 def _clearance() -> rrb.Spatial3DView:
-    names = ("clearance", "plan", "route", "drawn/**", "base/body", "base/heading", "tracks/**")
+    names = ("clearance", "rate", "plan", "route", "drawn/**", "base/body", "base/heading", "tracks/**")
     shown = [f"{scene.ODOM}/{name}" for name in names]
     contents = [*shown, f"{scene.MAP}/movers/**", f"{scene.MAP}/goals", f"{scene.MAP}/trail"]
     return views.scene("Clearance field, from above", scene.MAP, contents, scene.FOCUS, _ABOVE, [f"{scene.MAP}/trail"])
