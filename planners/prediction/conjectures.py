@@ -46,7 +46,7 @@ class ConjectureFamily:
         self._seen: Observed = nobody()
         self._mean, self._spread = np.zeros((count, 0, 4)), np.zeros((count, 0, 3))
         self._posterior = np.zeros((0, count))  # (obstacles, conjectures), where each has one of its own
-        self._shared = self._prior
+        self._shared: F64 = self._prior
         self._stamp_ns = 0
 
     @property
