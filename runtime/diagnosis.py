@@ -14,6 +14,7 @@ from runtime.operator_state import OperatorState
 from runtime.sections import DeadlineLadder, SupervisorSection
 from runtime.watch import DeviceWatch, WatchState
 
+LATE_SPAN_NS = 2_000_000_000  # over which the share of missed deadlines is told (the time constant of its mean)
 _NO_MOTION = 1e-6  # m/s: what a planner's rounding may leave on an axis that the base does not have
 
 
@@ -23,6 +24,7 @@ class DiagnosisState:
 
     latched: FaultReport | None
     misses: int
+    missed_share: float
     watch: WatchState
 
 
@@ -32,12 +34,14 @@ class Diagnosis:
     def __init__(self, settings: SupervisorSection, limits: BaseLimits | None, plan_budget_ns: int, board: FaultBoard) -> None:
         """Start with nothing latched."""
         self._ladder = settings.deadline_ladder
+        self._most_missed = settings.most_missed_share
         self._limits = limits
         self._plan_budget_ns = plan_budget_ns
         self._board = board
         self._watch = DeviceWatch(settings)
         self._latched: FaultReport | None = None
         self._misses = 0
+        self._missed_share = 0.0
 
     def faults(self, plan: Plan, belief: Belief, sensed: Sensed, operator: OperatorState) -> list[FaultReport]:
         """Return every fault that is present now, and the one that is latched although it has passed."""
@@ -51,11 +55,12 @@ class Diagnosis:
     @property
     def state(self) -> DiagnosisState:
         """What it goes on from."""
-        return DiagnosisState(self._latched, self._misses, self._watch.state)
+        return DiagnosisState(self._latched, self._misses, self._missed_share, self._watch.state)
 
     @state.setter
     def state(self, state: DiagnosisState) -> None:
-        self._latched, self._misses, self._watch.state = state.latched, state.misses, state.watch
+        self._latched, self._misses, self._missed_share = state.latched, state.misses, state.missed_share
+        self._watch.state = state.watch
 
     def _of_plan(self, plan: Plan) -> list[FaultReport]:
         twist = plan.base
@@ -76,6 +81,11 @@ class Diagnosis:
         rung = ladder_rung(self._ladder, self._misses)
         if rung is not None:
             found.append(FaultReport(rung, "loop", f"{self._misses} deadlines missed in a row"))
+        self._missed_share = missed_share(self._missed_share, tick.skipped, tick.period_ns)
+        if self._missed_share > self._most_missed and worst(found) < Response.DECELERATE:
+            found.append(
+                FaultReport(Fault.DEADLINE_SLOWED, "loop", f"{self._missed_share:.0%} of the last deadlines were missed")
+            )
         return found
 
     def _with_latched(self, faults: list[FaultReport], *, reset: bool) -> list[FaultReport]:
@@ -92,6 +102,12 @@ class Diagnosis:
 def worst(faults: list[FaultReport]) -> Response:
     """Return the most severe response that the faults ask for."""
     return max((report.response for report in faults), default=Response.RUN)
+
+
+def missed_share(share: float, missed: int, period_ns: int) -> float:
+    """Return the running mean of missed deadlines after so many more, and one that was met."""
+    kept = 1.0 - min(period_ns / LATE_SPAN_NS, 1.0)
+    return kept * (1.0 - (1.0 - share) * kept**missed)
 
 
 def ladder_rung(ladder: DeadlineLadder, misses: int) -> Fault | None:

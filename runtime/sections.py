@@ -35,6 +35,9 @@ class SupervisorSection(Settings):
     slow_factor: float = Field(default=0.5, gt=0.0, le=1.0, description="speed limits while decelerating are times this")
     give_up_after_s: float = Field(default=3.0, gt=0.0, description="a latched stop that nobody resets ends the run")
     deadline_ladder: DeadlineLadder = DeadlineLadder()
+    most_missed_share: float = Field(
+        default=0.25, ge=0.0, le=1.0, description="of the deadlines of two seconds; more, and the speed limits are lowered"
+    )
 
 
 class RealtimeSection(Settings):

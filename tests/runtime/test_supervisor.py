@@ -186,6 +186,18 @@ def test_the_ladder_is_climbed_by_consecutive_misses_only() -> None:
     assert guard.admit(FORWARD, belief(27), sensed(27)).response is Response.LATCH
 
 
+def test_a_loop_that_keeps_missing_drives_slower_until_it_is_on_time() -> None:
+    """Never two in a row, so that the ladder would only tolerate it."""
+    guard = supervisor()
+    drive(guard, range(20))
+    late = [guard.admit(FORWARD, belief(k), skipping(k, int(k % 2 == 0))) for k in range(20, 120)]
+    assert Fault.DEADLINE_SLOWED not in present(late[5])
+    assert Fault.DEADLINE_SLOWED in present(late[-1])
+    assert late[-1].response is Response.DECELERATE
+    punctual = drive(guard, range(120, 170))
+    assert punctual[-1].response is Response.RUN
+
+
 def test_a_held_command_keeps_its_expiry() -> None:
     guard = supervisor(deadline_ladder=DeadlineLadder(hold=1, decelerate=100, stop=100, latch=100))
     last = drive(guard, range(20))[-1]
