@@ -17,7 +17,7 @@ class RiskSettings(Settings):
     kind: Literal["inverse_clearance", "violation", "near_miss"] = Field(default="near_miss", description="g_risk")
     measure: Literal["cvar", "mean", "worst"] = Field(default="cvar", description="over the scenarios")
     tail_fraction: float = Field(default=0.1, gt=0.0, le=1.0, description="alpha")
-    weight: float = Field(default=1.0, ge=0.0, le=1000.0, description="lambda")
+    weight: float = Field(default=2.0, ge=0.0, le=1000.0, description="lambda")
     safe_m: float = Field(default=0.4, gt=0.0, le=5.0, description="clearance to what moves beyond which there is no risk")
     static_safe_m: float = Field(default=0.15, gt=0.0, le=5.0, description="likewise to what stands still")
     collision: float = Field(default=3.0, ge=0.0, le=100.0, description="added by near_miss where surfaces meet")
@@ -33,7 +33,7 @@ class RewardSettings(Settings):
     lateral: float = Field(default=0.5, ge=0.0, le=10.0, description="metres of route that a metre beside it costs")
     heading_m_per_rad: float = Field(default=0.15, ge=0.0, le=10.0, description="metres of route that facing away from it costs")
     look_ahead_m: float = Field(default=0.6, gt=0.0, le=10.0, description="how far along the route it should face")
-    reverse: float = Field(default=0.8, ge=0.0, le=10.0, description="metres of route that a metre driven backwards costs")
+    reverse: float = Field(default=0.4, ge=0.0, le=10.0, description="metres of route that a metre driven backwards costs")
     change: float = Field(
         default=0.05, ge=0.0, le=10.0, description="cost of a command as far from the last as standing from full speed"
     )

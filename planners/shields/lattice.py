@@ -39,7 +39,7 @@ class LatticeShieldDiagnostics(Diagnostics):
     clearance_m: float  # now, up to `far_m`
     least_clearance_m: float  # on the rollout of what is sent
     enclosed: bool = False  # an obstacle lies on the robot
-    infeasible: bool = False  # no candidate is feasible: the one that keeps most clearance is sent
+    infeasible: bool = False  # no candidate is feasible: what is sent is the best of what is penalised
 
 
 class LatticeShield:
@@ -54,9 +54,12 @@ class LatticeShield:
         gain: float = Field(default=0.9, gt=0.0, le=1.0, description="kappa: share of the margin that a rollout may take")
         far_m: float = Field(default=1.0, gt=0.0, le=10.0, description="clearance beyond which more is worth nothing")
         track_margin_m: float = Field(default=0.10, ge=0.0, le=1.0, description="occupied cells this near to a track are its own")
-        weight_progress: float = Field(default=1.0, ge=0.0, le=100.0, description="per metre towards where the asked twist leads")
+        weight_progress: float = Field(default=0.5, ge=0.0, le=100.0, description="per metre towards where the asked twist leads")
         weight_clearance: float = Field(default=0.5, ge=0.0, le=100.0, description="per metre")
-        weight_closeness: float = Field(default=0.5, ge=0.0, le=100.0, description="per share of the caps that separates the two")
+        weight_closeness: float = Field(default=1.5, ge=0.0, le=100.0, description="per share of the caps between the two")
+        weight_violation: float = Field(
+            default=30.0, ge=0.0, le=1000.0, description="per metre that a candidate is infeasible by"
+        )
         lattice: LatticeSettings = LatticeSettings()
 
     def __init__(self, settings: Settings, setup: ShieldSetup) -> None:
@@ -85,8 +88,9 @@ class LatticeShield:
         asked = reachable.clip(command.base if command.base.finite else BodyTwist())
         twists = self._candidates(asked)
         least, end, here = self._forecast(belief, twists)
-        feasible = self._feasible(least, here)
-        chosen = self._choose(twists, least, end - (belief.odom_from_base.x, belief.odom_from_base.y), feasible)
+        violation = self._violation(least, here)
+        feasible = violation == 0.0
+        chosen = self._choose(twists, least, end - (belief.odom_from_base.x, belief.odom_from_base.y), violation, here)
         twist = reachable.clip(BodyTwist(*twists[chosen].tolist()))
         said = LatticeShieldDiagnostics(
             int(feasible.sum()), bool(feasible[0]), here, float(least[chosen]), here < 0.0, not bool(feasible.any())
@@ -121,22 +125,22 @@ class LatticeShield:
         )  # fmt: skip
         return told
 
-    def _feasible(self, least_m: F64, here_m: float) -> NDArray[np.bool_]:
-        """Return which rollouts keep c_hard, and of the margin that is there now at least the share 1 - kappa."""
+    def _violation(self, least_m: F64, here_m: float) -> F64:
+        """Return by how much each rollout misses c_hard, or the share 1 - kappa of the margin that is there now, (n,) [m]."""
         hard_m, gain = self._settings.hard_m, self._settings.gain
-        keeps = (least_m - here_m) + gain * (here_m - hard_m) >= 0.0 if here_m > hard_m else np.ones(len(least_m), np.bool_)
-        return np.asarray((least_m >= hard_m) & keeps)
+        kept_m = hard_m + (1.0 - gain) * max(0.0, here_m - hard_m)
+        return np.asarray(np.maximum(0.0, kept_m - least_m))
 
-    def _choose(self, twists: F64, least_m: F64, moved: F64, feasible: NDArray[np.bool_]) -> int:
-        """Return the candidate to send: the asked one where it is feasible, else the best that is, else the least bad."""
-        if feasible[0]:
+    def _choose(self, twists: F64, least_m: F64, moved: F64, violation_m: F64, here_m: float) -> int:
+        """Return the candidate to send: the asked one where it is feasible, else the best, what is infeasible being penalised."""
+        if violation_m[0] == 0.0:
             return 0
         s = self._settings
+        if here_m < 0.0:  # an obstacle lies on the robot: nothing is worth pressing on for; of equals, the slowest
+            speed = np.abs(twists / self._caps).sum(axis=1)
+            return int(np.lexsort((speed, np.round(violation_m / _TIE)))[0])
         away = np.abs((twists - twists[0]) / self._caps).sum(axis=1)
-        if not feasible.any():
-            speed = np.abs(twists / self._caps).sum(axis=1)  # of those that keep as much, the slowest
-            return int(np.lexsort((speed, -np.round(least_m / _TIE) * _TIE))[0])
         length_m = math.hypot(*moved[0])
         towards = moved[0] / length_m if length_m > _TIE else np.zeros(2)
         worth = s.weight_progress * (moved @ towards) + s.weight_clearance * least_m - s.weight_closeness * away
-        return int(np.argmax(np.where(feasible, worth, -np.inf)))
+        return int(np.argmax(worth - s.weight_violation * violation_m))
