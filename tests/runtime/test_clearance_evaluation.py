@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from drivers.interface.errors import ConfigurationError
-from runtime.clearance_evaluation import ClearanceEvaluation
+from runtime import configuration, yaml_files
+from runtime.clearance_evaluation import ClearanceEvaluation, ClearanceExperiment
 from runtime.clearance_figures import jerk_rms
 from runtime.cli import run_command
 from runtime.evaluation import load_evaluation
@@ -82,6 +83,25 @@ def test_the_shipped_experiment_holds_every_scenario_of_the_paper_with_ten_paire
     evaluation = load_evaluation("clearance", None, ())
     assert isinstance(evaluation, ClearanceEvaluation)
     assert load_evaluation("clearance", None, (), ("table_1",)).steps == 6 * 2 * 10
+
+
+def test_every_method_of_the_shipped_experiment_is_a_configuration_of_what_its_name_says():
+    settings = ClearanceExperiment.model_validate(
+        {k: v for k, v in yaml_files.read(yaml_files.find("clearance", "experiments"), "experiments").items() if k != "kind"}
+    )
+    loaded = {
+        name: configuration.load("dynamic_hallway", (*settings.overrides, *method.overrides))
+        for name, method in settings.methods.items()
+    }
+    shields = {name: one.shield.settings for name, one in loaded.items()}
+    assert loaded["ours, 5 Hz, 120 deg"].loop.rate_hz == 5.0
+    assert shields["ours, objects"].form == "objects"
+    assert shields["point-DS, single scalar"].form == "single_scalar"
+    assert shields["ours, boundaries, no gate"].gate == "none"
+    assert shields["ours, gate by field rate"].gate == "field_rate"
+    assert shields["ours, material derivative"].buffer_max_m is None
+    assert shields["one boundary sample"].directions == 1
+    assert not loaded["no continuation"].planner.choice.settings.tracker.enabled
 
 
 def test_jerk_of_an_oscillation_is_the_closed_form():
