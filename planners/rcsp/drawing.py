@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
 
-from estimators.belief import F32, F64
+from estimators.belief import F32
 from planners.planner import Drawing, no_path
 from planners.rcsp.evaluation import Evaluation
-from planners.rcsp.kernels import first_conflict
+from planners.rcsp.kernels import by_conjecture, first_conflict
 from planners.velocity_lattice import Rollouts
 
 EVERY = 5  # steps between two dots
@@ -39,23 +37,3 @@ def drawn(rolled: Rollouts, told: Evaluation, names: tuple[str, ...], keenest: i
         at = max(commitment - 1, 0)
         point = np.array([[rolled.x[keenest, at], rolled.y[keenest, at]]], np.float64)
     return (*candidates, *futures, Drawing("commitment", point, connected=False))
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def by_conjecture(
-    position: F32, which: NDArray[np.int64], conjectures: int, every: int, shown: int
-) -> tuple[F64, NDArray[np.int64]]:
-    """Return every so many steps of the first scenarios, shape (dots, 2), ordered by conjecture, and where each one's end."""
-    steps, obstacles, _, n = position.shape
-    n = min(n, shown)
-    dots, edges = np.empty((steps // every * obstacles * n, 2)), np.zeros(conjectures + 1, np.int64)
-    at = 0
-    for c in range(conjectures):
-        for m in range(obstacles):
-            for i in range(n):
-                if which[m, i] == c:
-                    for k in range(every - 1, steps, every):
-                        dots[at, 0], dots[at, 1] = position[k, m, 0, i], position[k, m, 1, i]
-                        at += 1
-        edges[c + 1] = at
-    return dots, edges

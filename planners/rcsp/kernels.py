@@ -259,3 +259,23 @@ def first_conflict(x: F32, y: F32, futures: F32, contact: F32, count: int) -> in
         if hit.sum() >= count:
             return k
     return -1
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def by_conjecture(
+    position: F32, which: NDArray[np.int64], conjectures: int, every: int, shown: int
+) -> tuple[F64, NDArray[np.int64]]:
+    """Return every so many steps of the first scenarios, shape (dots, 2), ordered by conjecture, and where each one's end."""
+    steps, obstacles, _, n = position.shape
+    n = min(n, shown)
+    dots, edges = np.empty((steps // every * obstacles * n, 2)), np.zeros(conjectures + 1, np.int64)
+    at = 0
+    for c in range(conjectures):
+        for m in range(obstacles):
+            for i in range(n):
+                if which[m, i] == c:
+                    for k in range(every - 1, steps, every):
+                        dots[at, 0], dots[at, 1] = position[k, m, 0, i], position[k, m, 1, i]
+                        at += 1
+        edges[c + 1] = at
+    return dots, edges
