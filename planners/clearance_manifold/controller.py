@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -89,6 +90,8 @@ class ManifoldController:
         """
         cap, d = self._limits.velocity, self._settings.look_ahead_m
         if u[0] <= STANDSTILL_M_S:
+            if math.hypot(u[0], u[1]) > STANDSTILL_M_S:  # it is to go there, whatever it would look at
+                turn = min(max(self._settings.heading_gain_per_s * math.atan2(u[1], u[0]), -cap.wz), cap.wz)
             return BodyTwist(0.0, 0.0, turn)
         vx, wz_d = within(float(u[0]), float(u[1]), -cap.vx, cap.vx, cap.wz * d)
         return BodyTwist(vx, 0.0, wz_d / d)

@@ -29,8 +29,8 @@ TABLE_M, DESK_M, CABINET_M = (1.4, 0.8, 0.75), (1.6, 0.7, 0.75), (0.9, 0.5, 1.8)
 class OfficeTourSettings(Settings):
     """All figures are ours; the doorways take a robot of 0.34 m with room to spare."""
 
-    opening_m: float = Field(1.2, ge=0.6, le=1.6, description="width of the doorways")
-    open_s: float = Field(8.0, ge=0.1, le=120.0, description="how long the office's door rests open")
+    opening_m: float = Field(1.4, ge=0.6, le=1.6, description="width of the doorways")
+    open_s: float = Field(12.0, ge=0.1, le=120.0, description="how long the office's door rests open")
     move_s: float = Field(3.0, ge=0.5, le=60.0, description="how long it takes to open or close")
     closed_s: float = Field(4.0, ge=0.1, le=120.0, description="how long it rests closed")
     min_speed_m_s: float = Field(0.4, gt=0.0, le=2.0, description="slowest walker that is drawn")
