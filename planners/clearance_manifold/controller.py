@@ -62,7 +62,7 @@ class ManifoldController:
             speed = min(s.progress_m_s, brakable(at.free_m, s.deceleration_m_s2, s.delay_s))
         if not self._limits.holonomic:
             u = self._yielding(push + speed * tangent, at, body)
-            return self._look_ahead_twist(u, self.turn(at, yaw)), speed
+            return self._look_ahead_twist(u, speed, self.turn(at, yaw)), speed
         low_x = -cap.vx if self._limits.reverse else 0.0
         push_x, push_y = within(float(push[0]), float(push[1]), low_x if low_x < 0.0 else -1e-9, cap.vx, cap.vy)
         k = longitudinal(push_x, push_y, float(tangent[0]), float(tangent[1]), speed, cap.vx, cap.vy, low_x)
@@ -83,14 +83,15 @@ class ManifoldController:
         cap = self._limits.velocity.wz
         return min(max(self._settings.heading_gain_per_s * wrap_angle(at.heading_rad - yaw), -cap), cap)
 
-    def _look_ahead_twist(self, u: F64, turn: float) -> BodyTwist:
+    def _look_ahead_twist(self, u: F64, speed: float, turn: float) -> BodyTwist:
         """Return the twist that moves the point `look_ahead_m` ahead with velocity u, shape (2,), in the body frame.
 
-        Feedback linearisation: v = u_x, w = u_y / d.  What does not point ahead is turned to on the spot.
+        Feedback linearisation: v = u_x, w = u_y / d.  What does not point ahead is turned to on the spot; with no speed along
+        the manifold, `turn` says where to look meanwhile.
         """
         cap, d = self._limits.velocity, self._settings.look_ahead_m
         if u[0] <= STANDSTILL_M_S:
-            if math.hypot(u[0], u[1]) > STANDSTILL_M_S:  # it is to go there, whatever it would look at
+            if speed > STANDSTILL_M_S:  # it is to go there, whatever it would look at
                 turn = min(max(self._settings.heading_gain_per_s * math.atan2(u[1], u[0]), -cap.wz), cap.wz)
             return BodyTwist(0.0, 0.0, turn)
         vx, wz_d = within(float(u[0]), float(u[1]), -cap.vx, cap.vx, cap.wz * d)
