@@ -72,7 +72,7 @@ def _table(experiment: NavigationExperiment, table: TableSettings, episodes: Epi
             rows.append((method, f"{len(group)} runs", *cells))
             rows += _published(table, method)
     head = ("method", "from", *(_FIGURES[column].head for column in table.columns))
-    return EvaluationTable(head, tuple(rows), "", table.title)
+    return EvaluationTable(head, tuple(rows), "", _titled(table.title, rows))
 
 
 def _measured(values: list[float | None], digits: int) -> str:
@@ -106,7 +106,11 @@ def _paired(experiment: NavigationExperiment, paired: PairedSettings, episodes: 
         found = estimate_mean([gain(a, b, experiment) for a, b in pairs])
         figures = (f"{found.mean:.3f}", f"[{found.low:.3f}, {found.high:.3f}]", f"{found.not_above_zero:.3f}")
         rows.append((name, str(len(pairs)), *figures, _published_gain(paired, metric)))
-    return EvaluationTable(PAIRED_HEAD, tuple(rows), "", paired.title)
+    return EvaluationTable(PAIRED_HEAD, tuple(rows), "", _titled(paired.title, rows))
+
+
+def _titled(title: str, rows: list[tuple[str, ...]]) -> str:
+    return title if rows else f"{title}: left out, as its file of worlds is not set (--set files.NAME=PATH)"
 
 
 def _published_gain(paired: PairedSettings, metric: Metric) -> str:
