@@ -15,6 +15,7 @@ from estimators.field_query import sample
 
 FREE_AROUND_M = 0.45  # a place in view with so much clearance is nobody's
 SURE_S = 0.3  # what was seen to close in for less is the noise of a rate
+SLOW_M_S = 0.45  # the rates of a wall seen while turning look like this; nobody so slow is dangerous out of view
 SAME_M = 0.5  # from one time to the next, what is nearer than this to where it must be is the same
 
 
@@ -46,7 +47,8 @@ class ClosingMemory:
         there = self._kept[None, :2]
         seen = float(sample(age_s, field.lattice, there)[0]) == 0.0
         free = float(sample(field.clearance_m, field.lattice, there)[0]) > FREE_AROUND_M
-        if self._seen_s < SURE_S or self._unseen_s > self._carry_s or (seen and free):
+        slow = float(np.hypot(*self._kept[2:4])) < SLOW_M_S
+        if slow or self._seen_s < SURE_S or self._unseen_s > self._carry_s or (seen and free):
             self._kept, self._seen_s = np.zeros(5), 0.0
         return self._kept.copy()
 
