@@ -20,10 +20,10 @@ from drivers.interface.samples import frozen_array
 from estimators.belief import Belief
 from planners import standing
 from planners.dwa.kernels import Surroundings, visible_along
-from planners.orca.linear_program import choose_velocity
+from planners.orca.half_plane_kernels import agent_half_planes, standing_half_planes
 from planners.orca.motion import motion_of
+from planners.orca.program_kernels import choose_velocity
 from planners.orca.settings import ReciprocalAvoidanceSettings
-from planners.orca.velocity_obstacles import agent_half_planes, standing_half_planes
 from planners.planner import Diagnostics, Drawing, Plan, PlannerSetup
 from planners.polyline import resample
 from planners.router import Route

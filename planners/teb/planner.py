@@ -24,9 +24,9 @@ from planners.polyline import resample
 from planners.router import Route
 from planners.standing import Discs, StandingWorld, standing_world
 from planners.teb.band import Band, laid_along, taken_over
-from planners.teb.graph import Bounds, Ends, Scene, Weights
+from planners.teb.graph_kernels import Bounds, Ends, Scene, Weights
 from planners.teb.homotopy import Indices, detours, in_the_way, joined, sides, standing_discs
-from planners.teb.optimiser import optimised
+from planners.teb.optimiser_kernels import optimised
 from planners.teb.settings import ElasticBandSettings
 from planners.teb.window import Window, window_of
 

@@ -5,10 +5,10 @@ import pytest
 
 from drivers.interface.commands import BodyTwist
 from drivers.interface.errors import ConfigurationError
-from planners.orca.linear_program import choose_velocity, least_violation, nearest_inside
+from planners.orca.half_plane_kernels import agent_half_planes, standing_half_planes
 from planners.orca.nonholonomic import followable, followed, tracking_error_m
 from planners.orca.planner import ReciprocalAvoidance
-from planners.orca.velocity_obstacles import agent_half_planes, standing_half_planes
+from planners.orca.program_kernels import choose_velocity, least_violation, nearest_inside
 from planners.router import Route
 from planners.shields.plane_qp import solve
 from planners.standing import boundary_points, standing_world

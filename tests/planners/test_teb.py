@@ -9,10 +9,10 @@ from drivers.interface.errors import ConfigurationError
 from planners.router import Route
 from planners.standing import Discs, standing_world
 from planners.teb.band import Band, laid_along, taken_over
-from planners.teb.graph import BANDWIDTH, Bounds, Ends, Scene, Weights
+from planners.teb.cost_kernels import evaluated, nearest_poses
+from planners.teb.graph_kernels import BANDWIDTH, Bounds, Ends, Scene, Weights
 from planners.teb.homotopy import detours, in_the_way, sides, standing_discs
-from planners.teb.kernels import evaluated, nearest_poses
-from planners.teb.optimiser import optimised, passing_times, resized, solve_banded, stepped
+from planners.teb.optimiser_kernels import optimised, passing_times, resized, solve_banded, stepped
 from planners.teb.planner import ElasticBand
 from planners.teb.window import window_of
 from tests.planners.synthetic import OMNI, Box, Disc, belief_of, mission_to

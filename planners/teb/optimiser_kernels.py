@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from planners.teb.graph import BANDWIDTH, F64, Bounds, Ends, Scene, Weights
-from planners.teb.kernels import evaluated, nearest_poses
+from planners.teb.cost_kernels import evaluated, nearest_poses
+from planners.teb.graph_kernels import BANDWIDTH, F64, Bounds, Ends, Scene, Weights
 
 _SHORTEST_S = 1e-3  # between two poses
 _START_DAMPING = 1e-4  # of the largest element of the diagonal

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from planners.teb.graph import F64, Bounds, Ends, Indices, Normal, Weights, add, beyond
+from planners.teb.graph_kernels import F64, Bounds, Ends, Indices, Normal, Weights, add, beyond
 
 
 class Segments(NamedTuple):

@@ -10,8 +10,8 @@ import numpy as np
 from numba import njit
 
 from estimators.field_query import bilinear_gradient
-from planners.teb.graph import BANDWIDTH, F64, Bounds, Ends, Indices, Normal, Scene, Weights, add_at_pose
-from planners.teb.motion import add_acceleration, add_motion, segments_of
+from planners.teb.graph_kernels import BANDWIDTH, F64, Bounds, Ends, Indices, Normal, Scene, Weights, add_at_pose
+from planners.teb.motion_kernels import add_acceleration, add_motion, segments_of
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
