@@ -30,7 +30,7 @@ class OfficeTourSettings(Settings):
     """All figures are ours; the doorways take a robot of 0.34 m with room to spare."""
 
     opening_m: float = Field(1.4, ge=0.6, le=1.6, description="width of the doorways")
-    open_s: float = Field(12.0, ge=0.1, le=120.0, description="how long the office's door rests open")
+    open_s: float = Field(20.0, ge=0.1, le=120.0, description="how long the office's door rests open")
     move_s: float = Field(3.0, ge=0.5, le=60.0, description="how long it takes to open or close")
     closed_s: float = Field(4.0, ge=0.1, le=120.0, description="how long it rests closed")
     min_speed_m_s: float = Field(0.4, gt=0.0, le=2.0, description="slowest walker that is drawn")
@@ -38,7 +38,7 @@ class OfficeTourSettings(Settings):
     lateral_m: float = Field(0.5, ge=0.0, le=0.8, description="largest offset of the corridor's walker from its middle")
     walker_radius_m: float = Field(0.25, ge=0.1, le=0.35, description="radius of a walker")
     goal_tolerance_m: float = Field(0.35, gt=0.0, le=2.0, description="how near a goal counts as reached")
-    time_limit_s: float = Field(240.0, gt=0.0, le=3600.0, description="when the run is given up")
+    time_limit_s: float = Field(360.0, gt=0.0, le=3600.0, description="when the run is given up")
 
     @model_validator(mode="after")
     def _consistent(self) -> OfficeTourSettings:
