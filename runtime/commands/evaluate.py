@@ -26,7 +26,7 @@ def evaluate(
     markdown: Annotated[Path | None, typer.Option(help="write the table here as Markdown")] = None,
 ) -> None:
     """Run an experiment over its seeds and print its table beside the published figures."""
-    from runtime.evaluation import load_evaluation
+    from runtime.evaluations.evaluation import load_evaluation
 
     evaluation = load_evaluation(experiment, seeds, tuple(changes or ()), tuple(only or ()))
     require_writable(json, "--json")

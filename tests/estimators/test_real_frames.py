@@ -10,8 +10,8 @@ import pytest
 
 from drivers.interface.seeds import stream
 from runtime import yaml_files
-from runtime.frame_phantoms import cells_of, grids, occupied_within, phantoms, read_frames, returns
-from runtime.perception_evaluation import FramesSection
+from runtime.evaluations.frame_phantoms import cells_of, grids, occupied_within, phantoms, read_frames, returns
+from runtime.evaluations.perception_evaluation import FramesSection
 
 EXPERIMENT = yaml_files.read(yaml_files.find("perception", "experiments"), "experiments")
 SECTION = FramesSection.model_validate(EXPERIMENT["frames"])

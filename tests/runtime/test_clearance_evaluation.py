@@ -8,10 +8,10 @@ import pytest
 
 from drivers.interface.errors import ConfigurationError
 from runtime import configuration, yaml_files
-from runtime.clearance_evaluation import ClearanceEvaluation, ClearanceExperiment
-from runtime.clearance_figures import jerk_rms
 from runtime.cli import run_command
-from runtime.evaluation import load_evaluation
+from runtime.evaluations.clearance_evaluation import ClearanceEvaluation, ClearanceExperiment
+from runtime.evaluations.clearance_figures import jerk_rms
+from runtime.evaluations.evaluation import load_evaluation
 
 SMALL = """
 kind: clearance

@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 
 from drivers.interface.errors import ConfigurationError
-from runtime import experiment_table
 from runtime.cli import run_command
-from runtime.evaluation import EvaluationTable, load_evaluation
-from runtime.experiment import Case, Experiment, cases, run_case
+from runtime.evaluations import experiment_table
+from runtime.evaluations.evaluation import EvaluationTable, load_evaluation
+from runtime.evaluations.experiment import Case, Experiment, cases, run_case
+from runtime.evaluations.side_by_side import side_by_side
 from runtime.report import RunReport
-from runtime.side_by_side import side_by_side
 from runtime.yaml_files import shipped
 
 SHORT = ("mission.time_limit_s=1.5",)

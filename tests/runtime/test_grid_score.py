@@ -7,8 +7,8 @@ import pytest
 
 from drivers.interface.geometry import SE2
 from estimators.belief import FREE, OCCUPIED, Lattice, OccupancyGrid
+from runtime.evaluations.grid_score import GridFigures, View, compare
 from runtime.floor_plan import FloorPlan
-from runtime.grid_score import GridFigures, View, compare
 from sim_drivers.scene import Shape
 
 CELL_M, REACH_M, ORIGIN = 0.05, 2.4, SE2()

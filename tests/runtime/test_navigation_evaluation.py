@@ -15,16 +15,16 @@ from drivers.interface.mission import Goal
 from drivers.interface.samples import Stamp, TruthSample
 from planners.planner import Plan, no_path
 from planners.router import Route
-from runtime import navigation_experiment, navigation_table
-from runtime.bootstrap import estimate_mean
 from runtime.cli import run_command
 from runtime.cycle import Cycle, Verdict
-from runtime.episode import CostSettings, Episode, EpisodeMeter
-from runtime.evaluation import load_evaluation
+from runtime.evaluations import navigation_experiment, navigation_table
+from runtime.evaluations.bootstrap import estimate_mean
+from runtime.evaluations.episode import CostSettings, Episode, EpisodeMeter
+from runtime.evaluations.evaluation import load_evaluation
+from runtime.evaluations.navigation_experiment import NavigationExperiment
+from runtime.evaluations.shortest_way import shortest_way_m
 from runtime.faults import Response
-from runtime.navigation_experiment import NavigationExperiment
 from runtime.report import StageTime
-from runtime.shortest_way import shortest_way_m
 from runtime.supervisor import STANDING
 from sim_drivers.scene import Scene, Shape, StaticObstacle
 from tests.runtime.cycles import PERIOD_NS, belief, sensed

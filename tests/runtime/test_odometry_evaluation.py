@@ -7,8 +7,8 @@ import pytest
 
 from drivers.interface.errors import ConfigurationError
 from runtime.cli import run_command
-from runtime.evaluation import load_evaluation
-from runtime.recorded_odometry import read_points, score_recording
+from runtime.evaluations.evaluation import load_evaluation
+from runtime.evaluations.recorded_odometry import read_points, score_recording
 
 DATA = Path(__file__).parents[1] / "data" / "diff_drive"
 WHEELS, TRUTH = DATA / "input_excerpt.txt", DATA / "ground_truth_excerpt.txt"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from runtime.perception import _matched, perception
+from runtime.evaluations.perception import _matched, perception
 
 
 @pytest.mark.parametrize(("memory", "seed"), [("rolling", 0), ("layers", 1)])

@@ -9,7 +9,7 @@ import pytest
 
 from drivers.interface.errors import ConfigurationError
 from runtime.cli import run_command
-from runtime.evaluation import load_evaluation
+from runtime.evaluations.evaluation import load_evaluation
 
 FRAMES = Path(__file__).parents[1] / "data" / "realsense_depth"
 SMALL = f"""

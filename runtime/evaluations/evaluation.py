@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 from pydantic import ValidationError
 
@@ -30,27 +30,21 @@ class EvaluationTable:
         return "\n".join(("\n".join(lines) + "\n", *(one.markdown() for one in self.further)))
 
 
-class Evaluation(Protocol):
+class Evaluation(ABC):
     """An experiment that has been read, with what the command line adds to it."""
 
+    def __init__(self, title: str, steps: int) -> None:
+        """Take what stands over the table, and how many times `run` will say that something is done."""
+        self.title, self.steps = title, steps
+
     @classmethod
+    @abstractmethod
     def from_mapping(cls, content: yaml_files.Mapping, seeds: int | None, changes: tuple[str, ...]) -> Evaluation:
-        """Read the file's keys (`kind` taken out); raises pydantic's ValidationError."""
-        ...
+        """Read the file's keys (`kind` taken out), with changes for every run; raises pydantic's ValidationError."""
 
-    @property
-    def title(self) -> str:
-        """What stands over the table."""
-        ...
-
-    @property
-    def steps(self) -> int:
-        """How many times `run` will say that something is done."""
-        ...
-
+    @abstractmethod
     def run(self, jobs: int, done: Callable[[], None]) -> EvaluationTable:
         """Do everything, `jobs` at a time."""
-        ...
 
 
 def load_evaluation(name_or_path: str, seeds: int | None, changes: tuple[str, ...], only: tuple[str, ...] = ()) -> Evaluation:
@@ -61,12 +55,12 @@ def load_evaluation(name_or_path: str, seeds: int | None, changes: tuple[str, ..
     Raises:
         ConfigurationError: with file and key.
     """
-    from runtime.clearance_evaluation import ClearanceEvaluation  # noqa: PLC0415 - each kind knows this contract
-    from runtime.experiment import RunsEvaluation  # noqa: PLC0415
-    from runtime.navigation_evaluation import NavigationEvaluation  # noqa: PLC0415
-    from runtime.odometry_evaluation import OdometryEvaluation  # noqa: PLC0415
-    from runtime.perception_evaluation import PerceptionEvaluation  # noqa: PLC0415
-    from runtime.registration_evaluation import RegistrationEvaluation  # noqa: PLC0415
+    from runtime.evaluations.clearance_evaluation import ClearanceEvaluation  # noqa: PLC0415 - each kind knows this contract
+    from runtime.evaluations.experiment import RunsEvaluation  # noqa: PLC0415
+    from runtime.evaluations.navigation_evaluation import NavigationEvaluation  # noqa: PLC0415
+    from runtime.evaluations.odometry_evaluation import OdometryEvaluation  # noqa: PLC0415
+    from runtime.evaluations.perception_evaluation import PerceptionEvaluation  # noqa: PLC0415
+    from runtime.evaluations.registration_evaluation import RegistrationEvaluation  # noqa: PLC0415
 
     kinds: dict[str, type[Evaluation]] = {
         "runs": RunsEvaluation,

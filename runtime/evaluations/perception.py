@@ -17,7 +17,7 @@ from estimators.standard import StandardSettings
 from runtime import configuration
 from runtime.assembly import Assembly
 from runtime.cycle import Cycle
-from runtime.grid_score import GridFigures, GridScore
+from runtime.evaluations.grid_score import GridFigures, GridScore
 from runtime.run import RunOptions, run
 
 F64 = NDArray[np.float64]

@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 from drivers.interface.errors import ConfigurationError
 from drivers.interface.settings import Settings
 from runtime import yaml_files
-from runtime.episode import CostSettings
+from runtime.evaluations.episode import CostSettings
 from sim_drivers.scenarios.world_file import world_numbers
 
 Column = Literal[

@@ -16,8 +16,8 @@ from drivers.interface.sensed import Sensed
 from drivers.interface.settings import Settings
 from estimators.estimator import Estimator, EstimatorSetup
 from runtime import yaml_files
-from runtime.evaluation import EvaluationTable
-from runtime.side_by_side import side_by_side
+from runtime.evaluations.evaluation import Evaluation, EvaluationTable
+from runtime.evaluations.side_by_side import side_by_side
 
 Kind = Literal["dead_reckoning", "ekf"]
 KINDS: tuple[Kind, ...] = ("dead_reckoning", "ekf")
@@ -76,7 +76,7 @@ class Driven:
     estimates: tuple[Estimate, ...]
 
 
-class RegistrationEvaluation:
+class RegistrationEvaluation(Evaluation):
     """One drive a seed, and all estimators on what was sensed in it."""
 
     def __init__(self, settings: RegistrationExperiment, seeds: int | None, changes: tuple[str, ...]) -> None:
@@ -95,21 +95,12 @@ class RegistrationEvaluation:
             )
             for seed in range(seeds or settings.seeds)
         )
+        super().__init__(settings.title, len(self._todo))
 
     @classmethod
     def from_mapping(cls, content: yaml_files.Mapping, seeds: int | None, changes: tuple[str, ...]) -> RegistrationEvaluation:
         """Read the file's keys; raises pydantic's ValidationError."""
         return cls(RegistrationExperiment.model_validate(content), seeds, changes)
-
-    @property
-    def title(self) -> str:
-        """The experiment's own."""
-        return self._settings.title
-
-    @property
-    def steps(self) -> int:
-        """The number of drives."""
-        return len(self._todo)
 
     def run(self, jobs: int, done: Callable[[], None]) -> EvaluationTable:
         """Drive them all."""

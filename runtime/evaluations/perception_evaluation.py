@@ -15,10 +15,10 @@ from pydantic import Field, model_validator
 from drivers.interface.samples import Intrinsics
 from drivers.interface.settings import Settings
 from runtime import yaml_files
-from runtime.evaluation import EvaluationTable
-from runtime.frame_phantoms import Phantoms, phantoms, read_frames
-from runtime.perception import Perceived, perception
-from runtime.side_by_side import side_by_side
+from runtime.evaluations.evaluation import Evaluation, EvaluationTable
+from runtime.evaluations.frame_phantoms import Phantoms, phantoms, read_frames
+from runtime.evaluations.perception import Perceived, perception
+from runtime.evaluations.side_by_side import side_by_side
 
 HEAD = (
     "scene",
@@ -98,7 +98,7 @@ class Look:
     overrides: tuple[str, ...]
 
 
-class PerceptionEvaluation:
+class PerceptionEvaluation(Evaluation):
     """Scenes times front ends times seeds, then the recorded frames."""
 
     def __init__(self, settings: PerceptionExperiment, seeds: int | None, changes: tuple[str, ...]) -> None:
@@ -111,6 +111,7 @@ class PerceptionEvaluation:
             for front_end in scene.front_ends
             for seed in range(seeds or scene.seeds or settings.seeds)
         )
+        super().__init__(settings.title, len(self._todo))
 
     @classmethod
     def from_mapping(cls, content: yaml_files.Mapping, seeds: int | None, changes: tuple[str, ...]) -> PerceptionEvaluation:
@@ -123,16 +124,6 @@ class PerceptionEvaluation:
             else:
                 runs.append(change)
         return cls(PerceptionExperiment.model_validate(content), seeds, tuple(runs))
-
-    @property
-    def title(self) -> str:
-        """The experiment's own."""
-        return self._settings.title
-
-    @property
-    def steps(self) -> int:
-        """The number of runs."""
-        return len(self._todo)
 
     def run(self, jobs: int, done: Callable[[], None]) -> EvaluationTable:
         """Run them all, then play the frames."""

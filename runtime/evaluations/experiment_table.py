@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from statistics import fmean
 
-from runtime.experiment import Case, Experiment
+from runtime.evaluations.experiment import Case, Experiment
 from runtime.report import RunReport
 
 HEAD = (

@@ -16,9 +16,9 @@ from drivers.interface.errors import ConfigurationError
 from drivers.interface.sensed import Sensed
 from drivers.interface.settings import Settings
 from runtime import yaml_files
-from runtime.evaluation import EvaluationTable
-from runtime.recorded_odometry import RecordedScore, score_recording
-from runtime.side_by_side import side_by_side
+from runtime.evaluations.evaluation import Evaluation, EvaluationTable
+from runtime.evaluations.recorded_odometry import RecordedScore, score_recording
+from runtime.evaluations.side_by_side import side_by_side
 
 HEAD = ("drive", "odometry", "figure", "before", "after", "ratio")
 KINDS = ("dead_reckoning", "ekf")
@@ -62,7 +62,7 @@ class Drift:
     drift_rad: float
 
 
-class OdometryEvaluation:
+class OdometryEvaluation(Evaluation):
     """A calibrated and an uncalibrated robot on a square, and a recording with nominal and fitted parameters."""
 
     def __init__(self, settings: OdometryExperiment, seeds: int | None, changes: tuple[str, ...]) -> None:
@@ -77,21 +77,12 @@ class OdometryEvaluation:
                 raise ConfigurationError(
                     f"recording: there is no file '{path}'; write an experiment that extends this one with yours"
                 )
+        super().__init__(settings.title, len(self._todo))
 
     @classmethod
     def from_mapping(cls, content: yaml_files.Mapping, seeds: int | None, changes: tuple[str, ...]) -> OdometryEvaluation:
         """Read the file's keys; raises pydantic's ValidationError."""
         return cls(OdometryExperiment.model_validate(content), seeds, changes)
-
-    @property
-    def title(self) -> str:
-        """The experiment's own."""
-        return self._settings.title
-
-    @property
-    def steps(self) -> int:
-        """The number of squares."""
-        return len(self._todo)
 
     def run(self, jobs: int, done: Callable[[], None]) -> EvaluationTable:
         """Drive all squares, then score the recording."""

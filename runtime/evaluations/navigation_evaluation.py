@@ -8,19 +8,21 @@ from collections.abc import Callable
 from dataclasses import asdict
 
 from drivers.interface.errors import ConfigurationError
-from runtime import navigation_experiment, yaml_files
-from runtime.episode import Episode
-from runtime.evaluation import EvaluationTable
-from runtime.navigation_experiment import NavigationCase, NavigationExperiment
-from runtime.side_by_side import side_by_side
+from runtime import yaml_files
+from runtime.evaluations import navigation_experiment
+from runtime.evaluations.episode import Episode
+from runtime.evaluations.evaluation import Evaluation, EvaluationTable
+from runtime.evaluations.navigation_experiment import NavigationCase, NavigationExperiment
+from runtime.evaluations.side_by_side import side_by_side
 
 
-class NavigationEvaluation:
+class NavigationEvaluation(Evaluation):
     """Every run that the tables need, once; then the tables."""
 
     def __init__(self, experiment: NavigationExperiment, todo: tuple[NavigationCase, ...]) -> None:
         """Take what is to be run."""
         self._experiment, self._todo = experiment, todo
+        super().__init__(experiment.title, len(self._todo))
 
     @classmethod
     def from_mapping(cls, content: yaml_files.Mapping, seeds: int | None, changes: tuple[str, ...]) -> NavigationEvaluation:
@@ -32,19 +34,9 @@ class NavigationEvaluation:
         """
         return cls(*navigation_experiment.read(content, seeds, changes))
 
-    @property
-    def title(self) -> str:
-        """The experiment's own."""
-        return self._experiment.title
-
-    @property
-    def steps(self) -> int:
-        """The number of runs."""
-        return len(self._todo)
-
     def run(self, jobs: int, done: Callable[[], None]) -> EvaluationTable:
         """Run them all."""
-        from runtime import navigation_table  # noqa: PLC0415 - SciPy's statistics are not needed to read an experiment
+        from runtime.evaluations import navigation_table  # noqa: PLC0415 - SciPy's statistics are not needed to read an experiment
 
         episodes = side_by_side(self._todo, drive, jobs, lambda case, episode: done())
         first, *further = navigation_table.tables(self._experiment, episodes)
@@ -59,9 +51,9 @@ def drive(case: NavigationCase) -> Episode:
     """
     from runtime import configuration, run  # noqa: PLC0415 - in the worker process, not in the one that hands out the work
     from runtime.assembly import draw_scene  # noqa: PLC0415
-    from runtime.episode import EpisodeMeter  # noqa: PLC0415
-    from runtime.experiment import report_of  # noqa: PLC0415
-    from runtime.shortest_way import shortest_way_m  # noqa: PLC0415
+    from runtime.evaluations.episode import EpisodeMeter  # noqa: PLC0415
+    from runtime.evaluations.experiment import report_of  # noqa: PLC0415
+    from runtime.evaluations.shortest_way import shortest_way_m  # noqa: PLC0415
 
     loaded = configuration.load(case.configuration, case.overrides)
     scene = draw_scene(loaded, case.seed)

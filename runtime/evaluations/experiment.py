@@ -10,10 +10,10 @@ from pydantic import Field
 
 from drivers.interface.settings import Settings
 from runtime import yaml_files
-from runtime.evaluation import EvaluationTable
+from runtime.evaluations.evaluation import Evaluation, EvaluationTable
+from runtime.evaluations.side_by_side import side_by_side
 from runtime.referee import Outcome
 from runtime.report import RunReport
-from runtime.side_by_side import side_by_side
 
 if TYPE_CHECKING:
     from runtime.run import RunResult
@@ -65,31 +65,22 @@ def report_of(result: RunResult) -> RunReport:
     return result.report
 
 
-class RunsEvaluation:
+class RunsEvaluation(Evaluation):
     """Configurations times variants times seeds, and how the runs ended."""
 
     def __init__(self, settings: Experiment, seeds: int | None, changes: tuple[str, ...]) -> None:
         """Lay out the runs; `changes` are made in every one."""
         self._experiment, self._todo = settings, cases(settings, seeds, changes)
+        super().__init__(settings.title, len(self._todo))
 
     @classmethod
     def from_mapping(cls, content: yaml_files.Mapping, seeds: int | None, changes: tuple[str, ...]) -> RunsEvaluation:
         """Read the file's keys; raises pydantic's ValidationError."""
         return cls(Experiment.model_validate(content), seeds, changes)
 
-    @property
-    def title(self) -> str:
-        """The experiment's own."""
-        return self._experiment.title
-
-    @property
-    def steps(self) -> int:
-        """The number of runs."""
-        return len(self._todo)
-
     def run(self, jobs: int, done: Callable[[], None]) -> EvaluationTable:
         """Run them all."""
-        from runtime import experiment_table  # noqa: PLC0415 - it knows this module
+        from runtime.evaluations import experiment_table  # noqa: PLC0415 - it knows this module
 
         reports = side_by_side(self._todo, run_case, jobs, lambda case, report: done())
         rows = experiment_table.rows(self._experiment, reports)

@@ -11,11 +11,11 @@ from pydantic import Field, model_validator
 from drivers.interface.errors import unknown_name
 from drivers.interface.settings import Settings
 from runtime import yaml_files
-from runtime.clearance_figures import ClearanceFigures, FigureCollector
-from runtime.clearance_table import COLUMNS, table
-from runtime.evaluation import EvaluationTable
+from runtime.evaluations.clearance_figures import ClearanceFigures, FigureCollector
+from runtime.evaluations.clearance_table import COLUMNS, table
+from runtime.evaluations.evaluation import Evaluation, EvaluationTable
+from runtime.evaluations.side_by_side import side_by_side
 from runtime.referee import Outcome
-from runtime.side_by_side import side_by_side
 
 
 class Method(Settings):
@@ -71,7 +71,7 @@ class ClearanceCase:
     seed: int
 
 
-class ClearanceEvaluation:
+class ClearanceEvaluation(Evaluation):
     """Scenarios times methods times seeds, and the tables made of them."""
 
     def __init__(self, settings: ClearanceExperiment, seeds: int | None, changes: tuple[str, ...]) -> None:
@@ -80,21 +80,12 @@ class ClearanceEvaluation:
         wanted = settings.only or tuple(settings.tables)
         self._tables = tuple(settings.tables[name] for name in wanted)
         self._todo = tuple(dict.fromkeys(case for one in self._tables for group in self._groups(one).values() for case in group))
+        super().__init__(settings.title, len(self._todo))
 
     @classmethod
     def from_mapping(cls, content: yaml_files.Mapping, seeds: int | None, changes: tuple[str, ...]) -> ClearanceEvaluation:
         """Read the file's keys; raises pydantic's ValidationError."""
         return cls(ClearanceExperiment.model_validate(content), seeds, changes)
-
-    @property
-    def title(self) -> str:
-        """The experiment's own."""
-        return self._settings.title
-
-    @property
-    def steps(self) -> int:
-        """The number of runs."""
-        return len(self._todo)
 
     def run(self, jobs: int, done: Callable[[], None]) -> EvaluationTable:
         """Run them all and make the tables, the first with those that follow it."""

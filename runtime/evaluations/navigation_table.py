@@ -5,10 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from runtime.bootstrap import estimate_mean
-from runtime.episode import Episode
-from runtime.evaluation import EvaluationTable
-from runtime.navigation_experiment import Column, Metric, NavigationCase, NavigationExperiment, PairedSettings, TableSettings
+from runtime.evaluations.bootstrap import estimate_mean
+from runtime.evaluations.episode import Episode
+from runtime.evaluations.evaluation import EvaluationTable
+from runtime.evaluations.navigation_experiment import (
+    Column,
+    Metric,
+    NavigationCase,
+    NavigationExperiment,
+    PairedSettings,
+    TableSettings,
+)
 
 Episodes = dict[NavigationCase, Episode]
 PAIRED_HEAD = ("advantage", "pairs", "mean", "95 % interval", "p(advantage <= 0)", "paper")

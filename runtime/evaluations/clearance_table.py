@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import beta
 
-from runtime.clearance_figures import ClearanceFigures
-from runtime.evaluation import EvaluationTable
+from runtime.evaluations.clearance_figures import ClearanceFigures
+from runtime.evaluations.evaluation import EvaluationTable
 
 Published = Mapping[str, Mapping[str, Mapping[str, float]]]  # by scenario, method and column
 

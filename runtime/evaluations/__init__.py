@@ -1,0 +1,1 @@
+"""What `trundle evaluate` does: experiments, the kinds of them, and their tables."""
