@@ -19,7 +19,7 @@ def layout(header: RunHeader) -> rrb.Horizontal:
     """Return the layout, without views of what the robot does not have."""
     rows: list[rrb.Container | rrb.View] = []
     if "camera" in header.devices:
-        rows.append(rrb.Horizontal(rrb.Tabs(_depth(), _colour(), active_tab=0), _clearance()))
+        rows.append(rrb.Horizontal(rrb.Tabs(_depth(), _colour(), active_tab=0), _clearance(header)))
     if "base" in header.devices:
         rows.append(rrb.Horizontal(*(views.plot(f"{axis} [{_UNITS[axis]}]", f"/view/command/{axis}") for axis in plots.AXES)))
     if header.arm is not None:
@@ -38,9 +38,9 @@ def _scene(header: RunHeader) -> rrb.Spatial3DView:
     return views.scene("Scene", scene.MAP, contents, scene.FOCUS, eye, [f"{scene.MAP}/trail"])
 
 
-def _clearance() -> rrb.Spatial3DView:
-    names = ("clearance", "rate", "plan", "route", "drawn/**", "base/body", "base/heading", "tracks/**")
-    shown = [f"{scene.ODOM}/{name}" for name in names]
+def _clearance(header: RunHeader) -> rrb.Spatial3DView:
+    body = ("base/body", "base/heading") if "base" in header.devices else ()  # of an arm there are its links, in the scene
+    shown = [f"{scene.ODOM}/{name}" for name in ("clearance", "rate", "plan", "route", "drawn/**", *body, "tracks/**")]
     contents = [*shown, f"{scene.MAP}/movers/**", f"{scene.MAP}/goals", f"{scene.MAP}/trail"]
     return views.scene("Clearance field, from above", scene.MAP, contents, scene.FOCUS, _ABOVE, [f"{scene.MAP}/trail"])
 
