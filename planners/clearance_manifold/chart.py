@@ -14,7 +14,7 @@ from planners.clearance_manifold.settings import ChartSettings
 from planners.polyline import arc_length
 
 STEP_M = 0.1  # between two points of a centre line
-_NEAR_M = 3.0  # a robot is looked for this far around where it was
+NEAR_M = 3.0  # a robot is looked for this far around where it was
 _LONGEST_M = 100.0
 
 
@@ -30,9 +30,12 @@ class Chart:
         """Arc length from its first point to its last, the goal."""
         return STEP_M * (len(self.line) - 1)
 
-    def project(self, points: F64, near_m: float | None = None) -> F64:
-        """Return arc length and lateral offset, shape (n, 2) [m], of points in odom, shape (n, 2)."""
-        near, reach = (0.0, np.inf) if near_m is None else (near_m, _NEAR_M)
+    def project(self, points: F64, near_m: float | None = None, reach_m: float = NEAR_M) -> F64:
+        """Return arc length and lateral offset, shape (n, 2) [m], of points in odom, shape (n, 2).
+
+        They are looked for within `reach_m` of the arc length `near_m`; None: everywhere.
+        """
+        near, reach = (0.0, np.inf) if near_m is None else (near_m, reach_m)
         projected: F64 = project(self.line, STEP_M, np.ascontiguousarray(points), near, reach)
         return projected
 

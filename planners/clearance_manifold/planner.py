@@ -35,6 +35,7 @@ from planners.clearance_manifold.tracker import Category, Continuation, Tracker
 from planners.clearance_manifold.waiting import Waiting
 from planners.clearance_manifold.warm_up import rehearse
 from planners.planner import Plan, PlannerSetup
+from planners.polyline import arc_length
 from planners.router import Route
 
 
@@ -134,15 +135,20 @@ class ClearanceManifold:
         moved_m = math.inf if self._chart is None else float(np.hypot(*(goal - self._chart.goal)))
         if self._chart is not None and moved_m < self._settings.chart.escape_m:
             self._arc_m = float(self._chart.project(point[None], self._arc_m)[0, 0])
-            ahead = self._chart.project(route.path_in_odom[::4], self._arc_m)
-            near = ahead[:, 0] <= self._arc_m + self._settings.solver.horizon_m
-            if moved_m < 0.05 and not (np.abs(ahead[near, 1]) > self._settings.chart.escape_m).any():
+            if moved_m < 0.05 and not self._escapes(self._chart, route.path_in_odom):
                 return False
         behind = self._behind(point)
         self._chart = lay_chart(route.path_in_odom, goal, behind, self._settings.chart)
         self._arc_m = float(self._chart.project(point[None])[0, 0])
         self._tracker.rechart(self._chart)
         return moved_m > self._settings.tracker.goal_jump_m
+
+    def _escapes(self, chart: Chart, path: F64) -> bool:
+        """Return whether a route, shape (n, 2), leaves the chart's tube within the horizon."""
+        reach_m = self._settings.solver.horizon_m
+        near = path[arc_length(path) <= reach_m][::4]
+        offset_m = chart.project(near, self._arc_m, reach_m + 1.0)[:, 1]
+        return bool((np.abs(offset_m) > self._settings.chart.escape_m).any())
 
     def _behind(self, point: F64) -> F64:
         """Return the centre line behind the robot, for a new chart to join, shape (n, 2)."""
