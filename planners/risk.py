@@ -98,52 +98,61 @@ def _check(count: int, fraction: float) -> None:
         raise ValueError(f"it takes at least one sample and a fraction in (0, 1], not {count} and {fraction:g}")
 
 
-_FEW = 40  # up to so many are gathered by insertion, which takes their square
+@njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "arcp", "nsz"})  # type: ignore[untyped-decorator]
+def count_within(values: NDArray[np.float32], limit: np.float32) -> np.float32:
+    """Return how many of the values, shape (n,), are at most the limit; counted in the type of the values, to be vectorised."""
+    count, one, zero = np.float32(0.0), np.float32(1.0), np.float32(0.0)
+    for i in range(len(values)):
+        count += one if values[i] <= limit else zero
+    return count
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def extremes(values: NDArray[np.float32]) -> tuple[np.float32, np.float32]:
+    """Return the least and the largest of values, shape (n,), n > 0; in four lanes, as each comparison waits for the last."""
+    n = len(values)
+    l0, l1, l2, l3 = values[0], values[0], values[0], values[0]
+    h0, h1, h2, h3 = values[0], values[0], values[0], values[0]
+    for i in range(0, n - 3, 4):
+        a, b, c, d = values[i], values[i + 1], values[i + 2], values[i + 3]
+        l0, l1, l2, l3 = a if a < l0 else l0, b if b < l1 else l1, c if c < l2 else l2, d if d < l3 else l3
+        h0, h1, h2, h3 = a if a > h0 else h0, b if b > h1 else h1, c if c > h2 else h2, d if d > h3 else h3
+    low, high = min(l0, l1, l2, l3), max(h0, h1, h2, h3)
+    for i in range(n // 4 * 4, n):
+        low, high = min(low, values[i]), max(high, values[i])
+    return low, high
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def gather_smallest(values: NDArray[np.float32], count: int) -> None:
-    """Reorder values, shape (n,), so that the `count` smallest come first."""
-    if count > _FEW:
-        _partition(values, count)
-        return
-    for i in range(1, len(values)):
-        value = values[i]
-        if i >= count and value >= values[count - 1]:
-            continue
-        j = i
-        if i >= count:
-            j = count - 1
-            values[i] = values[j]
-        while j > 0 and values[j - 1] > value:
-            values[j] = values[j - 1]
-            j -= 1
-        values[j] = value
+    """Reorder finite values, shape (n,), so that the `count` smallest, n at most, come first, in no particular order.
+
+    The largest of them is found by bisection: counting is vectorised, where sorting guesses wrong at every other branch.
+    """
+    low, high = extremes(values)
+    while True:
+        middle = np.float32(0.5) * (low + high)
+        if not low < middle < high:
+            break
+        within = count_within(values, middle)
+        if within < count:
+            low = middle
+        else:
+            high = middle
+            if within == count:
+                break
+    moved = move_within(values, high)
+    if moved > count:  # several equal the largest
+        move_within(values[:moved], low)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _partition(values: NDArray[np.float32], count: int) -> None:
-    """Do the same by quickselect: in no particular order, but in time that grows with n alone.
-
-    Source: Hoare, Algorithm 65: Find, Communications of the ACM 4(7), 1961; the middle of three as pivot.
-    """
-    low, high = 0, len(values) - 1
-    while low < high:
-        a, b, c = values[low], values[(low + high) // 2], values[high]
-        pivot = max(min(a, b), min(max(a, b), c))
-        i, j = low, high
-        while i <= j:
-            while values[i] < pivot:
-                i += 1
-            while values[j] > pivot:
-                j -= 1
-            if i <= j:
-                values[i], values[j] = values[j], values[i]
-                i += 1
-                j -= 1
-        if count - 1 <= j:
-            high = j
-        elif count - 1 >= i:
-            low = i
-        else:
-            return
+def move_within(values: NDArray[np.float32], limit: np.float32) -> int:
+    """Reorder values, shape (n,), so that those at most the limit come first; return how many they are."""
+    first = 0
+    for i in range(len(values)):
+        value = values[i]
+        values[i] = values[first]
+        values[first] = value
+        first += value <= limit
+    return first

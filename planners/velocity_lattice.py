@@ -26,6 +26,7 @@ F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
 
 _SPARE_M = 1e-3  # who stands nearer than he should may go on where it is no narrower, to this
+_STEEPEST = 1.5  # no interpolated field of distances falls by more per metre
 
 
 class LatticeSettings(Settings):
@@ -113,6 +114,7 @@ class Ground(NamedTuple):
     radius_m: float  # of the robot
     hold_m: float  # nearer than this to what stands still it does not go: there it brakes
     body_m: float  # it also brakes before cells that were never seen, but for those so near; negative: they count as free
+    far_m: float  # clearance beyond which more makes no difference: there it is not looked up at every step
 
 
 class Rollouts(NamedTuple):
@@ -121,7 +123,7 @@ class Rollouts(NamedTuple):
     x: F32  # (commands, steps), in odom
     y: F32  # (commands, steps)
     yaw: F32  # (commands, steps)
-    static_m: F32  # (commands,): least clearance to what stands still, surface to surface
+    static_m: F32  # (commands,): least clearance to what stands still, surface to surface, exact up to the ground's `far_m`
     held: NDArray[np.int64]  # (commands,): steps driven before it had to brake for that; all of them where it had not
     brakable: NDArray[np.bool_]  # (commands,): it can stop in time where it has to
 
@@ -181,6 +183,7 @@ def roll_out(pose: F64, now: F64, speeds: F64, turns: F64, drive: Drive, step_s:
     cosine, sine, heading = np.empty(steps), np.empty(steps), np.empty(steps)
     here = bilinear(around.clearance, around.corner_x, around.corner_y, around.cell_m, pose[0], pose[1]) - around.radius_m
     least = min(around.hold_m, here - _SPARE_M)
+    far = max(around.far_m, around.hold_m)
     for j in range(len(turns)):
         angle = pose[2]
         for k in range(steps):
@@ -190,12 +193,15 @@ def roll_out(pose: F64, now: F64, speeds: F64, turns: F64, drive: Drive, step_s:
             heading[k] = angle
         for i in range(len(speeds)):
             u = i * len(turns) + j
-            px, py, room, driven, travelled = pose[0], pose[1], here, steps, 0.0
+            px, py, room, driven, travelled, free = pose[0], pose[1], here, steps, 0.0, (here - far) / _STEEPEST
             for k in range(steps):
                 if driven == steps:
                     forward = 0.5 * (v[i, k] + v[i, k + 1]) * step_s
                     nx, ny = px + forward * cosine[k], py + forward * sine[k]
-                    c = bilinear(around.clearance, around.corner_x, around.corner_y, around.cell_m, nx, ny) - around.radius_m
+                    free, c = free - abs(forward), room
+                    if free < 0.0:
+                        c = bilinear(around.clearance, around.corner_x, around.corner_y, around.cell_m, nx, ny) - around.radius_m
+                        free = (c - far) / _STEEPEST
                     blind = 0.0 <= around.body_m < travelled + abs(forward) and _never_seen(around, nx, ny)
                     if c < least or blind:
                         driven = k

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import F64, Belief
+from planners.prediction.chance import Chance
 from planners.prediction.kernels import HOLD, Draws, drawn_starts, followed, places_of, propagate
 from planners.prediction.observed import Observed, nobody, observed
 from planners.prediction.posterior import floored, heaviest, updated
@@ -66,7 +67,7 @@ class ConjectureFamily:
         one, lattice = type(self)(self._settings, self._robot_radius_m), np.zeros(2)
         one._follow(Observed(np.zeros(1, np.int64), np.ones((1, 4)), np.ones((1, 3)), np.ones(1)), lattice, 0.0)
         one._follow(one._seen, lattice, 0.1)
-        one.sample(Occasion(np.array([0.1, 0.2]), np.zeros((2, 2)), 2), np.random.Generator(np.random.PCG64(0)))
+        one.sample(Occasion(np.array([0.1, 0.2]), np.zeros((2, 2)), 2), Chance(0, "rehearsal"))
 
     def observe(self, belief: Belief) -> None:
         """Take in the tracks: beliefs under each conjecture are carried on and corrected, the posterior follows."""
@@ -100,27 +101,27 @@ class ConjectureFamily:
         else:
             self._shared = updated(self._shared[None], log_likelihood.sum(axis=1)[None], s.temperature, s.floor)[0]
 
-    def draw(self, steps: int, scenarios: int, rng: np.random.Generator) -> tuple[Draws, NDArray[np.int64]]:
+    def draw(self, steps: int, scenarios: int, chance: Chance) -> tuple[Draws, NDArray[np.int64]]:
         """Return where the scenarios start and what drives them on, and the conjecture of each, shape (obstacles, scenarios)."""
         s, obstacles = self._settings, len(self._seen)
         edges = np.cumsum(heaviest(self._posterior if s.per_obstacle else self._shared[None], s.top_k), axis=1)
-        uniform = rng.random((len(edges), scenarios))
-        normal = rng.standard_normal((4, obstacles, scenarios), dtype=np.float32)
-        push = rng.standard_normal((-(-steps // HOLD), obstacles, 2, scenarios), dtype=np.float32)
+        uniform = chance.uniform("conjecture", len(edges), scenarios)
+        normal = chance.normal("start", obstacles, 4, scenarios)
+        push = chance.normal("push", obstacles, 2 * -(-steps // HOLD), scenarios)
         told: tuple[Draws, NDArray[np.int64]] = drawn_starts(
             self._mean, self._spread, self._coefficients, edges, uniform, normal, push,
             self._seen.radius_m + self._robot_radius_m, self._cap, s.reaction_range_m,
         )  # fmt: skip
         return told
 
-    def sample(self, occasion: Occasion, rng: np.random.Generator) -> Futures:
+    def sample(self, occasion: Occasion, chance: Chance) -> Futures:
         """Return futures beside one motion of the robot."""
-        return self.sample_with_draws(occasion, rng)[0]
+        return self.sample_with_draws(occasion, chance)[0]
 
-    def sample_with_draws(self, occasion: Occasion, rng: np.random.Generator) -> tuple[Futures, Draws]:
+    def sample_with_draws(self, occasion: Occasion, chance: Chance) -> tuple[Futures, Draws]:
         """Return the futures and what they were made from, for futures beside other motions of the robot."""
         steps_s = np.diff(occasion.times_s, prepend=0.0)
-        draws, which = self.draw(len(steps_s), occasion.scenarios, rng)
+        draws, which = self.draw(len(steps_s), occasion.scenarios, chance)
         position = propagate(draws, steps_s, occasion.robot_in_odom.astype(np.float32))
         return Futures(position, self._seen.radius_m, which), draws
 

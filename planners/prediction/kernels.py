@@ -23,7 +23,7 @@ class Draws(NamedTuple):
 
     position: F32  # (obstacles, 2, scenarios), in odom
     velocity: F32  # (obstacles, 2, scenarios)
-    push: F32  # (holds, obstacles, 2, scenarios): accelerations, each held for `HOLD` steps, in standard deviations
+    push: F32  # (obstacles, 2 holds, scenarios): accelerations, x and y, each held for `HOLD` steps, in standard deviations
     speed_factor: F32  # (obstacles, scenarios), and the other coefficients of each one's conjecture
     slowing: F32
     pursuit: F32
@@ -50,34 +50,31 @@ def advance(draws: Draws, m: int, steps_s: F64, robot: F32, out: F32) -> None:
         out: futures of this obstacle.
     """
     n = draws.position.shape[2]
-    x, y = draws.position[m, 0].copy(), draws.position[m, 1].copy()
+    x, y = draws.position[m, 0], draws.position[m, 1]
     vx, vy = draws.velocity[m, 0].copy(), draws.velocity[m, 1].copy()
-    factor, slowing, strength = draws.speed_factor[m], draws.slowing[m], draws.acceleration[m]
-    along, towards = factor.copy(), np.zeros(n, np.float32)
-    reacts = (np.abs(slowing) + np.abs(draws.pursuit[m])).max() > 0.0
+    strength, along, towards = draws.acceleration[m], draws.speed_factor[m].copy(), np.zeros(n, np.float32)
+    away = np.empty(n, np.float32)
+    reacts = (np.abs(draws.slowing[m]) + np.abs(draws.pursuit[m])).max() > 0.0
     for k in range(len(steps_s)):
         dt, rx, ry = np.float32(steps_s[k]), robot[max(k - 1, 0), 0], robot[max(k - 1, 0), 1]
-        push_x, push_y = draws.push[k // HOLD, m, 0], draws.push[k // HOLD, m, 1]
+        push_x, push_y = draws.push[m, k // HOLD * 2], draws.push[m, k // HOLD * 2 + 1]
         if reacts:
-            react(draws, m, x, y, vx, vy, rx, ry, along, towards)
+            react(draws, m, x, y, vx, vy, rx, ry, away, along, towards)
+        next_x, next_y = out[k, 0], out[k, 1]
         for i in range(n):
-            x[i] += (along[i] * vx[i] + towards[i] * (rx - x[i])) * dt
+            next_x[i] = x[i] + (along[i] * vx[i] + towards[i] * (rx - x[i])) * dt
         for i in range(n):
-            y[i] += (along[i] * vy[i] + towards[i] * (ry - y[i])) * dt
+            next_y[i] = y[i] + (along[i] * vy[i] + towards[i] * (ry - y[i])) * dt
         for i in range(n):
             vx[i] += push_x[i] * strength[i] * dt
         for i in range(n):
             vy[i] += push_y[i] * strength[i] * dt
-        row_x, row_y = out[k, 0], out[k, 1]
-        for i in range(n):
-            row_x[i] = x[i]
-        for i in range(n):
-            row_y[i] = y[i]
+        x, y = next_x, next_y
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "arcp", "nsz"})  # type: ignore[untyped-decorator]
 def react(
-    draws: Draws, m: int, x: F32, y: F32, vx: F32, vy: F32, rx: np.float32, ry: np.float32, along: F32, towards: F32
+    draws: Draws, m: int, x: F32, y: F32, vx: F32, vy: F32, rx: np.float32, ry: np.float32, away: F32, along: F32, towards: F32
 ) -> None:
     """Write the share of its velocity that an obstacle goes on with, and what of the way to the robot it makes per second."""
     zero, one, near = np.float32(0.0), np.float32(1.0), np.float32(_NEAR)
@@ -85,14 +82,15 @@ def react(
     edge, slope = draws.contact_m[m] + np.float32(draws.range_m), np.float32(1.0 / draws.range_m)
     for i in range(len(x)):
         dx, dy = rx - x[i], ry - y[i]
-        g = (edge - np.sqrt(dx * dx + dy * dy)) * slope
+        away[i] = np.sqrt(dx * dx + dy * dy)
+    for i in range(len(x)):
+        g = (edge - away[i]) * slope
         g = zero if g < zero else (one if g > one else g)
         speed = np.sqrt(vx[i] * vx[i] + vy[i] * vy[i])
         speed = least[i] if speed < least[i] else speed
-        towards[i] = pursuit[i] * g * speed / (np.sqrt(dx * dx + dy * dy) + near)
+        towards[i] = pursuit[i] * g * speed / (away[i] + near)
     for i in range(len(x)):
-        dx, dy = rx - x[i], ry - y[i]
-        g = (edge - np.sqrt(dx * dx + dy * dy)) * slope
+        g = (edge - away[i]) * slope
         g = zero if g < zero else (one if g > one else g)
         along[i] = factor[i] + slowing[i] * g
 
@@ -109,7 +107,7 @@ def propagate(draws: Draws, steps_s: F64, robot: F32) -> F32:
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def drawn_starts(
-    mean: F64, spread: F64, coefficients: F64, edges: F64, uniform: F64, normal: F32, push: F32, contact: F64, cap: F64,
+    mean: F64, spread: F64, coefficients: F64, edges: F64, uniform: F32, normal: F32, push: F32, contact: F64, cap: F64,
     range_m: float,
 ) -> tuple[Draws, NDArray[np.int64]]:  # fmt: skip
     """Draw conjecture, position and velocity of every scenario; return them, and the conjectures, shape (obstacles, scenarios).
@@ -119,34 +117,36 @@ def drawn_starts(
         spread: variance of position, covariance, variance of velocity, each axis, shape (conjectures, obstacles, 3).
         coefficients: as in `followed`.
         edges: cumulated weights of the conjectures, shape (rows, conjectures): one row for all obstacles or one for each.
-        uniform: shape (rows, scenarios).
-        normal: standard normal, shape (4, obstacles, scenarios).
-        push: standard normal, shape (holds, obstacles, 2, scenarios).
+        uniform: shape (rows, 1, scenarios).
+        normal: standard normal, shape (obstacles, 4, scenarios).
+        push: standard normal, shape (obstacles, 2 holds, scenarios).
         contact: distance of the centres at contact, shape (obstacles,).
         cap: largest standard deviation of position and velocity, shape (2,).
         range_m: of reaction.
     """
-    _, obstacles, n = normal.shape
+    obstacles, _, n = normal.shape
+    conjectures = edges.shape[1]
     which = np.empty((obstacles, n), np.int64)
     position, velocity = np.empty((obstacles, 2, n), np.float32), np.empty((obstacles, 2, n), np.float32)
-    of = np.empty((5, obstacles, n), np.float32)
+    of, scale = np.empty((5, obstacles, n), np.float32), np.empty((conjectures, 3))
     for m in range(obstacles):
         row = min(m, len(edges) - 1)
+        for c in range(conjectures):
+            p, v = np.sqrt(spread[c, m, 0]), np.sqrt(spread[c, m, 2])
+            gain = spread[c, m, 1] / p if p > 0.0 else 0.0
+            shrink_p, shrink_v = min(1.0, cap[0] / max(p, 1e-12)), min(1.0, cap[1] / max(v, 1e-12))
+            scale[c] = shrink_p * p, shrink_v * gain, shrink_v * np.sqrt(max(spread[c, m, 2] - gain * gain, 0.0))
         for i in range(n):
             c = 0
-            while c < edges.shape[1] - 1 and uniform[row, i] >= edges[row, c]:
+            while c < conjectures - 1 and uniform[row, 0, i] >= edges[row, c]:
                 c += 1
             which[m, i] = c
             for k in range(5):
                 of[k, m, i] = coefficients[c, k]
-            p, v = np.sqrt(spread[c, m, 0]), np.sqrt(spread[c, m, 2])
-            gain = spread[c, m, 1] / p if p > 0.0 else 0.0
-            rest = np.sqrt(max(spread[c, m, 2] - gain * gain, 0.0))
-            shrink_p, shrink_v = min(1.0, cap[0] / max(p, 1e-12)), min(1.0, cap[1] / max(v, 1e-12))
             for axis in range(2):
-                e, f = normal[axis, m, i], normal[2 + axis, m, i]
-                position[m, axis, i] = mean[c, m, axis] + shrink_p * p * e
-                velocity[m, axis, i] = mean[c, m, 2 + axis] + shrink_v * (gain * e + rest * f)
+                e, f = normal[m, axis, i], normal[m, 2 + axis, i]
+                position[m, axis, i] = mean[c, m, axis] + scale[c, 0] * e
+                velocity[m, axis, i] = mean[c, m, 2 + axis] + scale[c, 1] * e + scale[c, 2] * f
     contact_m = contact.astype(np.float32)
     return Draws(position, velocity, push, of[0], of[1], of[2], of[3], of[4], contact_m, range_m), which
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from estimators.belief import F64, Track
+from estimators.belief import F64, Mask, Track
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,16 +32,23 @@ def observed(tracks: tuple[Track, ...]) -> Observed:
         [(track.identity, *track.position_in_odom, *track.velocity_in_odom, track.radius_m) for track in tracks], np.float64
     ).reshape(-1, 6)
     covariance = np.array([track.covariance for track in tracks]).reshape(-1, 4, 4)
-    sound = np.isfinite(rows).all(axis=1) & np.isfinite(covariance).all(axis=(1, 2))
-    rows, covariance = rows[sound], covariance[sound]
-    axes = covariance[:, (0, 0, 2), (0, 2, 2)] + covariance[:, (1, 1, 3), (1, 3, 3)]
-    spread = np.ascontiguousarray(0.5 * axes)
-    spread[:, ::2] = np.maximum(spread[:, ::2], 0.0)
-    limit = np.sqrt(spread[:, 0] * spread[:, 2])
-    spread[:, 1] = np.clip(spread[:, 1], -limit, limit)
-    return Observed(
-        rows[:, 0].astype(np.int64), np.ascontiguousarray(rows[:, 1:5]), spread, rows[:, 5].copy(), len(tracks) - len(rows)
-    )
+    sound, spread = _spreads(rows, covariance)
+    if not sound.all():
+        rows, spread = rows[sound], spread[sound]
+    return Observed(rows[:, 0].astype(np.int64), rows[:, 1:5].copy(), spread, rows[:, 5].copy(), len(tracks) - len(rows))
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _spreads(rows: F64, covariance: F64) -> tuple[Mask, F64]:
+    """Return which tracks are finite, shape (n,), and the variances of position, covariances, variances of velocity, (n, 3)."""
+    sound, spread = np.empty(len(rows), np.bool_), np.empty((len(rows), 3))
+    for i in range(len(rows)):
+        sound[i] = np.isfinite(rows[i]).all() and np.isfinite(covariance[i]).all()
+        c = covariance[i]
+        position, velocity = max(0.5 * (c[0, 0] + c[1, 1]), 0.0), max(0.5 * (c[2, 2] + c[3, 3]), 0.0)
+        limit = np.sqrt(position * velocity)
+        spread[i] = position, min(max(0.5 * (c[0, 2] + c[1, 3]), -limit), limit), velocity
+    return sound, spread
 
 
 def nobody() -> Observed:

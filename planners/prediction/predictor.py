@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from drivers.interface.stateful import Stateful
 from estimators.belief import F32, F64, Belief
+from planners.prediction.chance import Chance
 from planners.prediction.observed import Observed
 
 
@@ -32,7 +33,7 @@ class Occasion:
     """What futures are asked for: when, beside which motion of the robot, and how many."""
 
     times_s: F64  # (steps,), after the belief, increasing
-    robot_in_odom: F64  # (steps, 2), where the robot is meant to be at those times; some predictions react to it
+    robot_in_odom: F64 | F32  # (steps, 2), where the robot is meant to be at those times; some predictions react to it
     scenarios: int
 
 
@@ -64,6 +65,6 @@ class Predictor(Stateful, Protocol):
         """How much each conjecture is believed in, shape (conjectures,), summing to one; a mean over the obstacles."""
         ...
 
-    def sample(self, occasion: Occasion, rng: np.random.Generator) -> Futures:
-        """Return futures of the tracks last observed, drawn from `rng` alone."""
+    def sample(self, occasion: Occasion, chance: Chance) -> Futures:
+        """Return futures of the tracks last observed, drawn from `chance` alone."""
         ...

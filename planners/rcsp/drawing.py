@@ -6,8 +6,8 @@ import numpy as np
 
 from estimators.belief import F32
 from planners.planner import Drawing, no_path
+from planners.rcsp.drawing_kernels import by_conjecture, by_rank, first_conflict
 from planners.rcsp.evaluation import Evaluation
-from planners.rcsp.kernels import by_conjecture, first_conflict
 from planners.velocity_lattice import Rollouts
 
 EVERY = 5  # steps between two dots
@@ -24,12 +24,9 @@ def commitment_step(rolled: Rollouts, command: int, position: F32, contact: F32,
 
 def drawn(rolled: Rollouts, told: Evaluation, names: tuple[str, ...], keenest: int, commitment: int) -> tuple[Drawing, ...]:
     """Return the layers: dots along candidates in thirds of their objective, dots of futures, the point of no return."""
-    order, third = np.argsort(-told.objective, kind="stable"), len(told.objective) // 3
-    rank = np.empty(len(order), np.int64)
-    rank[order[:third]], rank[order[third : 2 * third]], rank[order[2 * third :]] = 0, 1, 2
-    rank[~told.free] = 3
-    ends = np.stack((rolled.x[:, -1], rolled.y[:, -1]), axis=1).astype(np.float64)
-    candidates = [Drawing(name, ends[rank == k], connected=False) for k, name in enumerate(GROUPS)]
+    order = np.argsort(-told.objective, kind="stable")
+    ends, parts = by_rank(rolled.x, rolled.y, order, told.free, len(GROUPS) - 1)
+    candidates = [Drawing(name, ends[parts[k] : parts[k + 1]], connected=False) for k, name in enumerate(GROUPS)]
     dots, edges = by_conjecture(told.futures.position_in_odom, told.futures.conjecture, len(names), EVERY, SHOWN)
     futures = [Drawing(f"futures_{name}", dots[edges[k] : edges[k + 1]], connected=False) for k, name in enumerate(names)]
     point = no_path()

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from estimators.belief import F32, F64
 from planners.planner import Diagnostics
+from planners.prediction.chance import Chance
 from planners.prediction.conjectures import ConjectureFamily
 from planners.prediction.predictor import Futures, Occasion, Predictor
 from planners.rcsp.kernels import (
@@ -60,11 +61,15 @@ class Evaluator:
     def __init__(self, settings: RcspSettings, predictor: Predictor, robot_radius_m: float, commands: int) -> None:
         """Take settings and predictor."""
         self._settings, self._predictor, self._radius_m, self._commands = settings, predictor, robot_radius_m, commands
+        self._times_s: F64 = np.asarray(
+            settings.lattice.latency_s + settings.step_s * np.arange(1, settings.steps + 1), np.float64
+        )
+        self._steps_s = np.diff(self._times_s, prepend=0.0)
         r = settings.risk
         self._risk = Risk(KINDS[r.kind], r.safe_m, r.collision, r.depth_m)
         self._bound = max(largest(self._risk, r.safe_m), largest(self._risk, r.static_safe_m))
 
-    def evaluate(self, rolled: Rollouts, reward: F64, nominal: int, scenarios: int, rng: np.random.Generator) -> Evaluation:
+    def evaluate(self, rolled: Rollouts, reward: F64, nominal: int, scenarios: int, chance: Chance) -> Evaluation:
         """Return the evaluation of all commands in `scenarios` futures, the same for every command.
 
         Args:
@@ -72,25 +77,22 @@ class Evaluator:
             reward: shape (commands,).
             nominal: the command that stands for the motion of the robot that obstacles react to.
             scenarios: N.
-            rng: what futures are drawn from.
+            chance: what futures are drawn from.
         """
         s = self._settings
-        times_s: F64 = np.asarray(s.lattice.latency_s + s.step_s * np.arange(1, s.steps + 1), np.float64)
-        robot = np.stack((rolled.x[nominal], rolled.y[nominal]), axis=1).astype(np.float64)
-        futures, clearance = self._held_against(rolled, times_s, robot, scenarios, rng)
+        robot = np.stack((rolled.x[nominal], rolled.y[nominal]), axis=1)
+        futures, clearance = self._held_against(rolled, robot, scenarios, chance)
         tail = tail_of(s.risk, scenarios)
         risk, room_m, free = tails(clearance, rolled.static_m, rolled.brakable, tail, self._risk, s.risk.static_safe_m)
         return Evaluation(reward - s.risk.weight * risk, reward, risk, room_m, free, clearance, futures, tail)
 
-    def _held_against(
-        self, rolled: Rollouts, times_s: F64, robot: F64, scenarios: int, rng: np.random.Generator
-    ) -> tuple[Futures, F32]:
+    def _held_against(self, rolled: Rollouts, robot: F32, scenarios: int, chance: Chance) -> tuple[Futures, F32]:
         far_m, predictor = self._settings.risk.safe_m, self._predictor
-        occasion = Occasion(times_s, robot, scenarios)
+        occasion = Occasion(self._times_s, robot, scenarios)
         if self._settings.reaction == "candidate" and isinstance(predictor, ConjectureFamily):
-            futures, draws = predictor.sample_with_draws(occasion, rng)
-            return futures, reacting_clearances(rolled.x, rolled.y, draws, np.diff(times_s, prepend=0.0), far_m)
-        futures = predictor.sample(occasion, rng)
+            futures, draws = predictor.sample_with_draws(occasion, chance)
+            return futures, reacting_clearances(rolled.x, rolled.y, draws, self._steps_s, far_m)
+        futures = predictor.sample(occasion, chance)
         contact = (futures.radius_m + self._radius_m).astype(np.float32)
         return futures, clearances(rolled.x, rolled.y, futures.position_in_odom, contact, far_m)
 

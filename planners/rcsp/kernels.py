@@ -1,4 +1,4 @@
-"""Clearances of every command in every scenario, their tails, and progress along the route; the scenario index last.
+"""Clearances of every command in every scenario, and their tails; the scenario index last.
 
 Source: Han, Zhu, RCSP, section 4.3, algorithm 1 (lines 4 and 5).
 """
@@ -12,7 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from planners.prediction.kernels import Draws, advance
-from planners.risk import gather_smallest
+from planners.risk import count_within, extremes, gather_smallest
 
 F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
@@ -57,51 +57,71 @@ def largest(risk: Risk, safe_m: float) -> float:
 
 
 @njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[untyped-decorator]
-def nearest_squared(x: F32, y: F32, own: F32, box: F32, reach: np.float32, best: F32) -> bool:
-    """Lower best, shape (scenarios,), to the least squared distances between robot, x and y of shape (steps,), and obstacle.
+def in_reach(x: F32, y: F32, box: F32, reach: np.float32, gap: F32, steps: NDArray[np.int64]) -> int:
+    """Write the steps at which a motion, x and y of shape (steps,), comes within reach of a box; return how many they are.
 
     Args:
         x: of the robot.
         y: likewise.
-        own: futures of the obstacle, shape (steps, 2, scenarios).
-        box: least x, largest x, least y, largest y of them at each step, shape (steps, 4); a step whose box is out of reach
-            is passed over.
+        box: least x, largest x, least y, largest y at each step, shape (4, steps).
         reach: distance that matters.
-        best: lowered where an obstacle is nearer.
-
-    Returns:
-        Whether any step was in reach.
+        gap: overwritten, shape (steps,).
+        steps: overwritten from the front, shape (steps,).
     """
-    touched = False
-    n = own.shape[2]
     zero = np.float32(0.0)
+    left, right, bottom, top = box[0], box[1], box[2], box[3]
     for k in range(len(x)):
-        px, py = x[k], y[k]
-        gap_x, gap_y = max(box[k, 0] - px, px - box[k, 1], zero), max(box[k, 2] - py, py - box[k, 3], zero)
-        if gap_x * gap_x + gap_y * gap_y >= reach * reach:
-            continue
-        touched = True
-        ox, oy = own[k, 0], own[k, 1]
-        for i in range(n):
-            dx, dy = ox[i] - px, oy[i] - py
-            d = dx * dx + dy * dy
-            best[i] = d if d < best[i] else best[i]
-    return touched
+        gap_x, beyond_x = left[k] - x[k], x[k] - right[k]
+        gap_y, beyond_y = bottom[k] - y[k], y[k] - top[k]
+        gap_x, gap_y = gap_x if gap_x > beyond_x else beyond_x, gap_y if gap_y > beyond_y else beyond_y
+        gap_x, gap_y = gap_x if gap_x > zero else zero, gap_y if gap_y > zero else zero
+        gap[k] = gap_x * gap_x + gap_y * gap_y
+    count, limit = 0, reach * reach
+    for k in range(len(x)):
+        steps[count] = k
+        count += 1 if gap[k] < limit else 0
+    return count
+
+
+@njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[untyped-decorator]
+def nearest_squared(x: F32, y: F32, own: F32, steps: NDArray[np.int64], best: F32) -> None:
+    """Lower best, shape (scenarios,), to the least squared distance to an obstacle over some steps, four of them at a time.
+
+    Args:
+        x: of the robot, shape (horizon,).
+        y: likewise.
+        own: futures of the obstacle, shape (horizon, 2, scenarios).
+        steps: which of the horizon, at least one.
+        best: lowered where an obstacle is nearer.
+    """
+    whole = len(steps) // 4 * 4
+    for q in range(0, whole, 4):
+        a, b, c, d = steps[q], steps[q + 1], steps[q + 2], steps[q + 3]
+        ax, bx, cx, dx, ay, by, cy, dy = x[a], x[b], x[c], x[d], y[a], y[b], y[c], y[d]
+        own_ax, own_bx, own_cx, own_dx = own[a, 0], own[b, 0], own[c, 0], own[d, 0]
+        own_ay, own_by, own_cy, own_dy = own[a, 1], own[b, 1], own[c, 1], own[d, 1]
+        for i in range(len(best)):
+            to_a = (own_ax[i] - ax) * (own_ax[i] - ax) + (own_ay[i] - ay) * (own_ay[i] - ay)
+            to_b = (own_bx[i] - bx) * (own_bx[i] - bx) + (own_by[i] - by) * (own_by[i] - by)
+            to_c = (own_cx[i] - cx) * (own_cx[i] - cx) + (own_cy[i] - cy) * (own_cy[i] - cy)
+            to_d = (own_dx[i] - dx) * (own_dx[i] - dx) + (own_dy[i] - dy) * (own_dy[i] - dy)
+            to_a, to_c = to_a if to_a < to_b else to_b, to_c if to_c < to_d else to_d
+            to_a = to_a if to_a < to_c else to_c
+            best[i] = to_a if to_a < best[i] else best[i]
+    for q in range(whole, len(steps)):
+        ax, ay, own_ax, own_ay = x[steps[q]], y[steps[q]], own[steps[q], 0], own[steps[q], 1]
+        for i in range(len(best)):
+            to_a = (own_ax[i] - ax) * (own_ax[i] - ax) + (own_ay[i] - ay) * (own_ay[i] - ay)
+            best[i] = to_a if to_a < best[i] else best[i]
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def boxes(own: F32) -> F32:
-    """Return the box around all scenarios at each step, shape (steps, 4), of futures of shape (steps, 2, scenarios)."""
-    steps, _, n = own.shape
-    box = np.empty((steps, 4), np.float32)
-    for k in range(steps):
-        for axis in range(2):
-            low, high = own[k, axis, 0], own[k, axis, 0]
-            for i in range(1, n):
-                v = own[k, axis, i]
-                low = v if v < low else low
-                high = v if v > high else high
-            box[k, 2 * axis], box[k, 2 * axis + 1] = low, high
+    """Return the box around all scenarios at each step, shape (4, steps), of futures of shape (steps, 2, scenarios)."""
+    box = np.empty((4, len(own)), np.float32)
+    for k in range(len(own)):
+        box[0, k], box[1, k] = extremes(own[k, 0])
+        box[2, k], box[3, k] = extremes(own[k, 1])
     return box
 
 
@@ -129,7 +149,10 @@ def clearances(x: F32, y: F32, futures: F32, contact: F32, far_m: float) -> F32:
     """
     steps, obstacles, _, n = futures.shape
     clearance = np.full((len(x), n), np.float32(far_m))
-    own, best = np.empty((steps, 2, n), np.float32), np.empty(n, np.float32)
+    if n == 0:
+        return clearance
+    own, best, near = np.empty((steps, 2, n), np.float32), np.empty(n, np.float32), np.empty(steps, np.int64)
+    gap = np.empty(steps, np.float32)
     for m in range(obstacles):
         for k in range(steps):
             for axis in range(2):
@@ -137,8 +160,10 @@ def clearances(x: F32, y: F32, futures: F32, contact: F32, far_m: float) -> F32:
                     own[k, axis, i] = futures[k, m, axis, i]
         box, reach = boxes(own), contact[m] + np.float32(far_m)
         for u in range(len(x)):
-            best[:] = reach * reach
-            if nearest_squared(x[u], y[u], own, box, reach, best):
+            count = in_reach(x[u], y[u], box, reach, gap, near)
+            if count > 0:
+                best[:] = reach * reach
+                nearest_squared(x[u], y[u], own, near[:count], best)
                 lower_clearance(best, contact[m], clearance[u])
     return clearance
 
@@ -150,14 +175,15 @@ def reacting_clearances(x: F32, y: F32, draws: Draws, steps_s: F64, far_m: float
     steps = len(steps_s)
     clearance = np.full((len(x), n), np.float32(far_m))
     own, best, robot = np.empty((steps, 2, n), np.float32), np.empty(n, np.float32), np.empty((steps, 2), np.float32)
+    all_steps = np.arange(steps)
     for u in range(len(x)):
         robot[:, 0], robot[:, 1] = x[u], y[u]
         for m in range(obstacles):
             advance(draws, m, steps_s, robot, own)
             reach = draws.contact_m[m] + np.float32(far_m)
             best[:] = reach * reach
-            if nearest_squared(x[u], y[u], own, boxes(own), reach, best):
-                lower_clearance(best, draws.contact_m[m], clearance[u])
+            nearest_squared(x[u], y[u], own, all_steps, best)
+            lower_clearance(best, draws.contact_m[m], clearance[u])
     return clearance
 
 
@@ -183,11 +209,12 @@ def tails(
     """
     commands, n = clearance.shape
     tail, room, free = np.empty(commands), np.empty(commands), np.empty(commands, np.bool_)
+    below_safe = np.nextafter(np.float32(risk.safe_m), np.float32(-1.0))
     for u in range(commands):
         floor = risk_of(static_m[u] if brakable[u] else -np.inf, static_safe_m, risk)
         row = clearance[u]
         tail[u], room[u], free[u] = floor, min(risk.safe_m, static_m[u]), brakable[u]
-        if n == 0 or row.min() >= risk.safe_m:
+        if n == 0 or count_within(row, below_safe) == 0.0:
             continue
         gather_smallest(row, count)
         total, width, edge = 0.0, 0.0, row[0]
@@ -210,72 +237,9 @@ def mean_risk(clearance: F32, static_m: float, brakable: bool, risk: Risk, stati
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def to_go(x: F32, y: F32, yaw: F32, path: F64, along: F64, lateral: float, heading: float, look_ahead_m: float) -> F64:
-    """Return the way that is left from each pose, shape (n,) [m]: along the route from the nearest point of it, plus what
-    lying beside it and facing away from where it leads cost.
-
-    Args:
-        x: of the poses, shape (n,).
-        y: likewise.
-        yaw: likewise.
-        path: the route, shape (m, 2).
-        along: distance of its points along it, shape (m,).
-        lateral: metres per metre beside it.
-        heading: metres per radian that the pose faces away from the point `look_ahead_m` farther along.
-        look_ahead_m: at the route's end the heading counts no more.
-    """
-    left = np.empty(len(x))
-    last = len(path) - 1
-    for i in range(len(x)):
-        nearest, at = np.inf, 0.0
-        for j in range(last):
-            ax, ay = path[j + 1, 0] - path[j, 0], path[j + 1, 1] - path[j, 1]
-            squared = ax * ax + ay * ay
-            t = ((x[i] - path[j, 0]) * ax + (y[i] - path[j, 1]) * ay) / squared if squared > 0.0 else 0.0
-            t = min(max(t, 0.0), 1.0)
-            dx, dy = x[i] - path[j, 0] - t * ax, y[i] - path[j, 1] - t * ay
-            d = dx * dx + dy * dy
-            if d < nearest:
-                nearest, at = d, along[j] + t * (along[j + 1] - along[j])
-        wanted = min(at + look_ahead_m, along[last])
-        j = min(np.searchsorted(along, wanted), last)
-        bearing = np.arctan2(path[j, 1] - y[i], path[j, 0] - x[i]) - yaw[i]
-        off = abs((bearing + np.pi) % (2.0 * np.pi) - np.pi)
-        near_end = min(1.0, (along[last] - at) / look_ahead_m)
-        left[i] = along[last] - at + lateral * np.sqrt(nearest) + heading * near_end * off
-    return left
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def first_conflict(x: F32, y: F32, futures: F32, contact: F32, count: int) -> int:
-    """Return the first step at which a motion of shape (steps,) touches an obstacle in `count` scenarios or more; -1: never."""
-    steps, obstacles, _, n = futures.shape
-    hit = np.zeros(n, np.bool_)
-    for k in range(steps):
-        for m in range(obstacles):
-            for i in range(n):
-                dx, dy = futures[k, m, 0, i] - x[k], futures[k, m, 1, i] - y[k]
-                hit[i] |= dx * dx + dy * dy < contact[m] * contact[m]
-        if hit.sum() >= count:
-            return k
-    return -1
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def by_conjecture(
-    position: F32, which: NDArray[np.int64], conjectures: int, every: int, shown: int
-) -> tuple[F64, NDArray[np.int64]]:
-    """Return every so many steps of the first scenarios, shape (dots, 2), ordered by conjecture, and where each one's end."""
-    steps, obstacles, _, n = position.shape
-    n = min(n, shown)
-    dots, edges = np.empty((steps // every * obstacles * n, 2)), np.zeros(conjectures + 1, np.int64)
-    at = 0
-    for c in range(conjectures):
-        for m in range(obstacles):
-            for i in range(n):
-                if which[m, i] == c:
-                    for k in range(every - 1, steps, every):
-                        dots[at, 0], dots[at, 1] = position[k, m, 0, i], position[k, m, 1, i]
-                        at += 1
-        edges[c + 1] = at
-    return dots, edges
+def least_gap(state: F64, contact: F64, x: float, y: float) -> float:
+    """Return the least clearance of the robot from obstacles, states of shape (obstacles, 4); infinite where there are none."""
+    least = np.inf
+    for m in range(len(state)):
+        least = min(least, np.hypot(state[m, 0] - x, state[m, 1] - y) - contact[m])
+    return least

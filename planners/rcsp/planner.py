@@ -14,11 +14,11 @@ import numpy as np
 
 from drivers.interface.commands import BodyTwist
 from drivers.interface.errors import ConfigurationError
-from drivers.interface.seeds import stream
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import F64, Belief
 from planners.planner import Plan, PlannerSetup
 from planners.polyline import beginning
+from planners.prediction.chance import Chance
 from planners.prediction.conjectures import ConjectureFamily
 from planners.prediction.constant_velocity import ConstantVelocityPredictor
 from planners.prediction.predictor import Predictor
@@ -26,14 +26,16 @@ from planners.prediction.random_walk import RandomWalkPredictor
 from planners.rcsp.budget import affordable
 from planners.rcsp.drawing import commitment_step, drawn
 from planners.rcsp.evaluation import Evaluation, Evaluator, RcspDiagnostics
-from planners.rcsp.kernels import to_go
+from planners.rcsp.kernels import least_gap
+from planners.rcsp.progress_kernels import way_made
 from planners.rcsp.rehearsal import rehearse
 from planners.rcsp.settings import RcspSettings
 from planners.router import Route
-from planners.static_field import movers, static_clearance
+from planners.static_field import movers, surroundings
 from planners.velocity_lattice import Drive, Ground, Rollouts, VelocityLattice, after_latency, roll_out
 
 _SPACING_M = 0.12  # of the points of the route that progress is measured along
+_FIELD_SPARE_M = 0.25  # what the clearance is known beyond where it matters, so that it need not be looked up at every step
 _ROUTE_SPARE_M = 1.0  # how much farther along than a rollout reaches
 
 
@@ -56,7 +58,12 @@ class Rcsp:
         self._drive = Drive.of(settings.lattice, setup.limits)
         self._predictor = _predictor(settings, setup.robot_radius_m)
         self._evaluator = Evaluator(settings, self._predictor, setup.robot_radius_m, len(self._lattice))
+        self._chance = Chance(setup.seed, "rcsp")
+        backwards = np.maximum(-self._lattice.speed_m_s, 0.0) / self._lattice.speed_m_s[-1]
+        self._reverse_cost = settings.reward.reverse * np.repeat(backwards, len(self._lattice.turn_rad_s))  # (commands,)
+        self._looks = np.array(_judged_at(settings.steps))
         self._standing = self._lattice.index_of_rest
+        self._effort = self._lattice.change_from(self._standing)
         self._last = self._standing  # the command asked for last
 
     def warm_up(self) -> None:
@@ -85,9 +92,9 @@ class Rcsp:
             return Plan(BodyTwist(), diagnostics=said)
         rolled = self._rolled_out(belief)
         reward = self._reward(belief, route, rolled)
-        rng = stream(self._setup.seed, "rcsp", belief.tick if self._settings.fresh_draws else 0)
-        told = self._evaluator.evaluate(rolled, reward, self._last, scenarios, rng)
-        self._last, free = told.best(self._lattice.change_from(self._standing))
+        chance = Chance(self._setup.seed, "rcsp", belief.tick) if self._settings.fresh_draws else self._chance
+        told = self._evaluator.evaluate(rolled, reward, self._last, scenarios, chance)
+        self._last, free = told.best(self._effort)
         return self._plan(belief, rolled, told, free, budget_ns)
 
     def _refusal(self, belief: Belief, route: Route) -> str:
@@ -97,21 +104,26 @@ class Rcsp:
             return "the way is blocked" if route.blocked else "no goal"
         if not (belief.twist.finite and math.isfinite(pose.x) and math.isfinite(pose.y) and math.isfinite(pose.yaw)):
             return "the pose or the twist is not finite"
-        if math.hypot(*(route.path_in_odom[-1] - (pose.x, pose.y))) < self._settings.arrival_m:
+        end_x, end_y = route.path_in_odom[-1].tolist()
+        if math.hypot(end_x - pose.x, end_y - pose.y) < self._settings.arrival_m:
             return "arrived"
         return ""
 
     def _rolled_out(self, belief: Belief) -> Rollouts:
         """Return where each command leads from when it takes hold, in the field of what stands still."""
-        s, pose, lattice = self._settings, belief.odom_from_base, belief.grid.lattice
+        s, pose, radius_m = self._settings, belief.odom_from_base, self._setup.robot_radius_m
         last = self._lattice.twist(self._last)
         start, now = after_latency(
             np.array([pose.x, pose.y, pose.yaw]), np.array([belief.twist.vx, belief.twist.wz]),
             np.array([last.vx, last.wz]), self._drive,
         )  # fmt: skip
+        fastest = max(abs(belief.twist.vx), *np.abs(self._lattice.speed_m_s[[0, -1]]).tolist())
+        far_m = max(s.risk.safe_m, s.risk.static_safe_m, s.hold_m)
+        reach_m = fastest * (s.lattice.latency_s + s.step_s * s.steps)
+        near = surroundings(belief, s.track_margin_m, reach_m, far_m + radius_m + _FIELD_SPARE_M)
         around = Ground(
-            static_clearance(belief, s.track_margin_m), belief.grid.label, lattice.x_m, lattice.y_m, lattice.cell_m,
-            self._setup.robot_radius_m, s.hold_m, s.body_m if s.stop_before_unknown else -1.0,
+            near.clearance_m, near.label, near.lattice.x_m, near.lattice.y_m, near.lattice.cell_m,
+            radius_m, s.hold_m, s.body_m if s.stop_before_unknown else -1.0, far_m,
         )  # fmt: skip
         speeds, turns = self._lattice.speed_m_s, self._lattice.turn_rad_s
         rolled: Rollouts = roll_out(start, now, speeds, turns, self._drive, s.step_s, s.steps, around)
@@ -123,19 +135,12 @@ class Rcsp:
         reach_m = self._lattice.speed_m_s[-1] * s.step_s * s.steps
         path, along = beginning(route.path_in_odom, reach_m + _ROUTE_SPARE_M, _SPACING_M)
         pose = belief.odom_from_base
-        now = np.array([[pose.x], [pose.y], [pose.yaw]], np.float32)
-        here_m = to_go(now[0], now[1], now[2], path, along, r.lateral, r.heading_m_per_rad, r.look_ahead_m)
-        least_m = np.full(len(self._lattice), np.inf)
-        for k in _judged_at(s.steps):
-            x, y, yaw = (np.ascontiguousarray(part[:, k]) for part in rolled[:3])
-            left_m = to_go(x, y, yaw, path, along, r.lateral, r.heading_m_per_rad, r.look_ahead_m)
-            least_m = np.minimum(least_m, left_m)
-        progress = (here_m - least_m) / reach_m
-        backwards = (
-            np.repeat(np.maximum(-self._lattice.speed_m_s, 0.0), len(self._lattice.turn_rad_s)) / self._lattice.speed_m_s[-1]
-        )
-        cost = r.reverse * backwards + r.change * self._lattice.change_from(self._last)
-        return np.asarray(np.clip(progress - cost, -1.0, 1.0))
+        made_m = way_made(
+            np.array([pose.x, pose.y, pose.yaw]), rolled.x, rolled.y, rolled.yaw, self._looks, path, along,
+            r.lateral, r.heading_m_per_rad, r.look_ahead_m,
+        )  # fmt: skip
+        cost = self._reverse_cost + r.change * self._lattice.change_from(self._last)
+        return np.asarray(np.clip(made_m / reach_m - cost, -1.0, 1.0))
 
     def _plan(self, belief: Belief, rolled: Rollouts, told: Evaluation, free: bool, budget_ns: int | None) -> Plan:
         chosen = self._last
@@ -159,9 +164,9 @@ class Rcsp:
             obstacles=position.shape[1],
             commitment_s=max(0.0, (commitment + 1) * self._settings.step_s - brake_s) if commitment >= 0 else -1.0,
             **{
-                f"weight_{n}": float(w)
-                for n, w in zip(self._predictor.conjectures, self._predictor.weights, strict=True)
-                if n != "random_walk"
+                f"weight_{name}": weight
+                for name, weight in zip(self._predictor.conjectures, self._predictor.weights.tolist(), strict=True)
+                if name != "random_walk"
             },
         )
         path = np.stack((rolled.x[chosen], rolled.y[chosen]), axis=1).astype(np.float64)
@@ -182,8 +187,7 @@ class Rcsp:
             return f"{seen.left_out} tracks are not finite and were left out"
         if len(seen) == 0:
             return ""
-        gap_m = np.hypot(*(seen.state[:, :2] - (pose.x, pose.y)).T) - seen.radius_m - self._setup.robot_radius_m
-        if gap_m.min() < 0.0:
+        if least_gap(seen.state, seen.radius_m + self._setup.robot_radius_m, pose.x, pose.y) < 0.0:
             return "an obstacle lies on the robot"
         if seen.spread[:, 0].max() > self._settings.prediction.sigma_cap_m**2:
             return "a track is too uncertain to say where its obstacle is"

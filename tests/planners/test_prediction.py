@@ -8,9 +8,9 @@ import pytest
 from pydantic import ValidationError
 
 from drivers.interface.samples import frozen_array
-from drivers.interface.seeds import stream
 from drivers.interface.stateful import Stateful
 from estimators.belief import Track
+from planners.prediction.chance import Chance
 from planners.prediction.conjectures import ConjectureFamily
 from planners.prediction.constant_velocity import ConstantVelocityPredictor
 from planners.prediction.kernels import followed
@@ -54,7 +54,7 @@ def test_the_contract(predictor):
     predictor.warm_up()
     predictor.observe(seen(0, track(3.0, 0.0, -0.5), track(2.0, 2.0, 0.3, identity=7)))
     predictor.observe(seen(1, track(2.95, 0.0, -0.5), track(2.03, 2.0, 0.3, identity=7), track(9.0, 9.0, identity=8)))
-    first, again = (predictor.sample(Occasion(TIMES_S, FAR, 32), stream(3, "test")) for _ in range(2))
+    first, again = (predictor.sample(Occasion(TIMES_S, FAR, 32), Chance(3, "test")) for _ in range(2))
     assert first.position_in_odom.shape == (20, 3, 2, 32)
     assert first.position_in_odom.dtype == np.float32
     assert first.scenarios == 32
@@ -63,7 +63,7 @@ def test_the_contract(predictor):
     assert predictor.weights.sum() == pytest.approx(1.0)
     assert len(predictor.weights) == len(predictor.conjectures)
     predictor.observe(seen(2))
-    assert predictor.sample(Occasion(TIMES_S, FAR, 32), stream(3, "test")).position_in_odom.shape == (20, 0, 2, 32)
+    assert predictor.sample(Occasion(TIMES_S, FAR, 32), Chance(3, "test")).position_in_odom.shape == (20, 0, 2, 32)
 
 
 @pytest.mark.parametrize(("factor", "favoured"), [(0.0, "static"), (0.5, "slow"), (1.0, "constant"), (1.5, "fast")])
@@ -102,7 +102,7 @@ def test_with_a_posterior_each_two_obstacles_are_told_apart():
     predictor = family(per_obstacle=True)
     for tick in range(40):
         predictor.observe(seen(tick, track(5.0, 4.0, 0.8), track(5.0 + 0.08 * tick, -4.0, 0.8, identity=1)))
-    futures = predictor.sample(Occasion(TIMES_S, FAR, 400), stream(1, "test"))
+    futures = predictor.sample(Occasion(TIMES_S, FAR, 400), Chance(1, "test"))
     names = np.array(FAMILY)
     assert (names[futures.conjecture[0]] == "static").mean() > 0.5
     assert (names[futures.conjecture[1]] == "static").mean() < 0.1
@@ -144,7 +144,7 @@ def test_samples_of_constant_velocity_are_spread_as_the_covariance_carried_on():
     covariance[0, 2] = covariance[2, 0] = covariance[1, 3] = covariance[3, 1] = 0.03
     predictor = ConstantVelocityPredictor()
     predictor.observe(seen(0, track(1.0, 2.0, 0.5, -0.2, covariance=covariance)))
-    position = predictor.sample(Occasion(np.array([2.0]), FAR[:1], 40_000), stream(1, "test")).position_in_odom[0, 0]
+    position = predictor.sample(Occasion(np.array([2.0]), FAR[:1], 40_000), Chance(1, "test")).position_in_odom[0, 0]
     assert position.mean(axis=1) == pytest.approx([2.0, 1.6], abs=0.01)
     assert position.var(axis=1) == pytest.approx([0.04 + 4.0 * 0.03 + 4.0 * 0.09] * 2, rel=0.03)
 
@@ -152,7 +152,7 @@ def test_samples_of_constant_velocity_are_spread_as_the_covariance_carried_on():
 def test_a_random_walk_spreads_with_the_root_of_the_time():
     predictor = RandomWalkPredictor(0.5)
     predictor.observe(seen(0, track(1.0, 2.0, 0.5, -0.2)))
-    position = predictor.sample(Occasion(TIMES_S, FAR, 20_000), stream(1, "test")).position_in_odom[:, 0]
+    position = predictor.sample(Occasion(TIMES_S, FAR, 20_000), Chance(1, "test")).position_in_odom[:, 0]
     assert position[-1].mean(axis=1) == pytest.approx([1.0, 2.0], abs=0.02)
     assert position.var(axis=2)[:, 0] == pytest.approx(0.25 * TIMES_S, rel=0.05)
 
@@ -161,7 +161,7 @@ def test_a_random_walk_spreads_with_the_root_of_the_time():
 def test_a_conjecture_alone_drives_at_its_share_of_the_tracked_speed(name, speed):
     predictor = family(family=[name])
     predictor.observe(seen(0, track(1.0, 2.0, 0.5, 0.0)))
-    position = predictor.sample(Occasion(TIMES_S, FAR, 500), stream(1, "test")).position_in_odom[-1, 0]
+    position = predictor.sample(Occasion(TIMES_S, FAR, 500), Chance(1, "test")).position_in_odom[-1, 0]
     assert position.mean(axis=1) == pytest.approx([1.0 + 2.0 * speed, 2.0], abs=0.02)
 
 
@@ -171,7 +171,7 @@ def test_the_last_two_react_to_where_the_robot_is_meant_to_be():
         predictor = family(family=[name])
         predictor.observe(seen(0, track(1.2, 0.8, -0.4, 0.0)))
         near, far = (
-            predictor.sample(Occasion(TIMES_S, path, 200), stream(1, "test")).position_in_odom[-1, 0] for path in (robot, FAR)
+            predictor.sample(Occasion(TIMES_S, path, 200), Chance(1, "test")).position_in_odom[-1, 0] for path in (robot, FAR)
         )
         gap_near, gap_far = (np.hypot(*position).mean() for position in (near, far))
         if nearer is None:
@@ -183,7 +183,7 @@ def test_the_last_two_react_to_where_the_robot_is_meant_to_be():
 def test_uncertain_tracks_are_drawn_within_the_cap():
     predictor = family()
     predictor.observe(seen(0, track(1.0, 2.0, covariance=np.diag([1e8] * 4))))
-    start = predictor.sample(Occasion(np.array([1e-3]), FAR[:1], 2000), stream(1, "test")).position_in_odom[0, 0]
+    start = predictor.sample(Occasion(np.array([1e-3]), FAR[:1], 2000), Chance(1, "test")).position_in_odom[0, 0]
     assert start.std(axis=1) == pytest.approx([1.0, 1.0], rel=0.1)
 
 
@@ -212,3 +212,13 @@ def test_the_top_k_are_renormalised():
 def test_settings_that_make_no_sense_are_refused(wrong):
     with pytest.raises(ValidationError):
         PredictionSettings.model_validate(wrong)
+
+
+def test_fewer_scenarios_and_fewer_rows_are_the_first_of_more():
+    chance = Chance(7, "test")
+    few, many = chance.normal("start", 2, 4, 16), chance.normal("start", 3, 4, 64)
+    assert np.array_equal(few, many[:2, :, :16])
+    assert np.array_equal(few, chance.normal("start", 2, 4, 16))
+    assert np.array_equal(chance.uniform("conjecture", 1, 8)[0], Chance(7, "test").uniform("conjecture", 2, 24)[0, :, :8])
+    assert not np.array_equal(few, Chance(8, "test").normal("start", 2, 4, 16))
+    assert not np.array_equal(many[0], many[1])

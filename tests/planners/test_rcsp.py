@@ -13,8 +13,9 @@ from drivers.interface.samples import frozen_array
 from estimators.belief import Track
 from planners.planner import Anytime, PlannerSetup
 from planners.rcsp.budget import affordable
-from planners.rcsp.kernels import INVERSE_CLEARANCE, NEAR_MISS, VIOLATION, Risk, clearances, largest, risk_of, to_go
+from planners.rcsp.kernels import INVERSE_CLEARANCE, NEAR_MISS, VIOLATION, Risk, clearances, largest, risk_of
 from planners.rcsp.planner import Rcsp
+from planners.rcsp.progress_kernels import to_go
 from planners.router import RouterSetup
 from planners.routers.straight import StraightRouter
 from planners.shield import ShieldSetup

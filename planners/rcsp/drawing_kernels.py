@@ -1,0 +1,62 @@
+"""What the viewer shows of a decision, gathered from its arrays."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+F64 = NDArray[np.float64]
+F32 = NDArray[np.float32]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def first_conflict(x: F32, y: F32, futures: F32, contact: F32, count: int) -> int:
+    """Return the first step at which a motion of shape (steps,) touches an obstacle in `count` scenarios or more; -1: never."""
+    steps, obstacles, _, n = futures.shape
+    hit = np.zeros(n, np.bool_)
+    for k in range(steps):
+        for m in range(obstacles):
+            for i in range(n):
+                dx, dy = futures[k, m, 0, i] - x[k], futures[k, m, 1, i] - y[k]
+                hit[i] |= dx * dx + dy * dy < contact[m] * contact[m]
+        if hit.sum() >= count:
+            return k
+    return -1
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def by_conjecture(
+    position: F32, which: NDArray[np.int64], conjectures: int, every: int, shown: int
+) -> tuple[F64, NDArray[np.int64]]:
+    """Return every so many steps of the first scenarios, shape (dots, 2), ordered by conjecture, and where each one's end."""
+    steps, obstacles, _, n = position.shape
+    n = min(n, shown)
+    dots, edges = np.empty((steps // every * obstacles * n, 2)), np.zeros(conjectures + 1, np.int64)
+    at = 0
+    for c in range(conjectures):
+        for m in range(obstacles):
+            for i in range(n):
+                if which[m, i] == c:
+                    for k in range(every - 1, steps, every):
+                        dots[at, 0], dots[at, 1] = position[k, m, 0, i], position[k, m, 1, i]
+                        at += 1
+        edges[c + 1] = at
+    return dots, edges
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def by_rank(x: F32, y: F32, order: NDArray[np.int64], free: NDArray[np.bool_], thirds: int) -> tuple[F64, NDArray[np.int64]]:
+    """Return the ends of the motions, shape (commands, 2), the free ones by thirds of their order, then the others; and the
+    edges of these groups, shape (thirds + 2,).
+    """
+    count, last = len(order), x.shape[1] - 1
+    ends, edges, at = np.empty((count, 2)), np.zeros(thirds + 2, np.int64), 0
+    for group in range(thirds + 1):
+        for rank in range(count):
+            u = order[rank]
+            if (min(rank // max(count // thirds, 1), thirds - 1) if free[u] else thirds) == group:
+                ends[at, 0], ends[at, 1] = x[u, last], y[u, last]
+                at += 1
+        edges[group + 1] = at
+    return ends, edges
