@@ -1,7 +1,7 @@
-"""What of the grid stands still: the occupied cells that no track explains, for planners that predict tracks by themselves.
+"""What stands still as planners want it that lay constraints: signed clearance, thinned boundary points; and tracks as arrays.
 
 A walker is in the grid as well as among the tracks.  Where a planner moves the tracks on, the cells that they fill now would be
-a second obstacle that stays behind.
+a second obstacle that stays behind; `static_field` takes them out.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ from drivers.interface.samples import frozen_array
 from estimators.belief import F32, F64, OCCUPIED, Belief, Lattice, Mask, Track
 from estimators.clearance import distance_to
 from estimators.field_query import sample
+from planners import static_field
+from planners.static_field import static_cells
 
 _RIM_CELLS = 2.0  # a track's cells may lie this far outside of its disc: the grid is that coarse, and a walker moves on
 
@@ -58,26 +60,13 @@ class Discs:
 
 
 def standing_world(belief: Belief) -> StandingWorld:
-    """Return the belief's grid without the cells that its tracks explain."""
+    """Return the belief's grid without the cells that what moves explains."""
     lattice = belief.grid.lattice
-    occupied = belief.grid.label == OCCUPIED
-    for track in belief.tracks:
-        _erase(occupied, lattice, track)
+    cells = static_cells(belief, _RIM_CELLS * lattice.cell_m)
+    occupied = belief.grid.label == OCCUPIED if cells is None else cells
     outside, inside = distance_to(occupied, lattice.cell_m), distance_to(~occupied, lattice.cell_m)
     clearance = np.where(occupied, np.float32(lattice.cell_m) - inside, outside)
     return StandingWorld(lattice, frozen_array(occupied), frozen_array(clearance))
-
-
-def _erase(occupied: Mask, lattice: Lattice, track: Track) -> None:
-    """Clear the cells of a track's disc and of its rim."""
-    (x, y), reach_m = track.position_in_odom, track.radius_m + _RIM_CELLS * lattice.cell_m
-    corners = np.array([[x - reach_m, y - reach_m], [x + reach_m, y + reach_m]])
-    rows, columns = lattice.cell_of(corners)
-    r0, c0 = max(int(rows[0]), 0), max(int(columns[0]), 0)
-    window = occupied[r0 : max(int(rows[1]) + 1, r0), c0 : max(int(columns[1]) + 1, c0)]
-    r, c = np.indices(window.shape)
-    dx, dy = lattice.x_m + (c + c0 + 0.5) * lattice.cell_m - x, lattice.y_m + (r + r0 + 0.5) * lattice.cell_m - y
-    window[dx * dx + dy * dy <= reach_m * reach_m] = False
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -144,6 +133,7 @@ def boundary_points(world: StandingWorld, path: F64, reach_m: float, spacing_m: 
 
 def warm_up() -> None:
     """Compile the kernels, for arrays that are read-only as those of a `StandingWorld` are."""
+    static_field.warm_up(frozen_array(np.zeros((2, 2), np.uint8)))
     occupied = np.zeros((3, 3), np.bool_)
     occupied[1, 1] = True
     world = StandingWorld(Lattice(0.0, 0.0, 1.0, 3, 3), frozen_array(occupied), frozen_array(np.ones((3, 3), np.float32)))

@@ -23,6 +23,7 @@ from planners.mpc_cbf.settings import BarrierMpcSettings
 from planners.planner import Diagnostics, Drawing, Plan, PlannerSetup
 from planners.router import Route
 from planners.standing import Discs, StandingWorld, boundary_points, standing_world
+from planners.static_field import movers
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +159,7 @@ class BarrierMpc:
         """Return what barriers are drawn around, widened by the robot and the margin: the nearest tracks and boundary cells."""
         s = self._settings
         widen_m = self._setup.robot_radius_m + s.margin_m
-        tracks = Discs.of(belief.tracks)
+        tracks = Discs.of(movers(belief))
         nearest = np.argsort(np.hypot(*(tracks.centre - state[:2]).T) - tracks.radius_m, kind="stable")[: s.tracks]
         path = rollout(state, self._shifted(), s.step_s)[:, :2]
         points = boundary_points(world, path, s.boundary_range_m, s.boundary_spacing_m, s.boundary_points)

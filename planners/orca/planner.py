@@ -29,6 +29,7 @@ from planners.polyline import resample
 from planners.router import Route
 from planners.shields.plane_qp import feasible_polygon
 from planners.standing import Discs, StandingWorld, boundary_points, standing_world
+from planners.static_field import movers
 
 F64 = NDArray[np.float64]
 
@@ -91,7 +92,7 @@ class ReciprocalAvoidance:
     def plan(self, belief: Belief, route: Route) -> Plan:
         """Return the twist; zero without a route, at its end, and inside an obstacle."""
         pose = belief.odom_from_base
-        here, agents, world = np.array([[pose.x, pose.y]]), Discs.of(belief.tracks), standing_world(belief)
+        here, agents, world = np.array([[pose.x, pose.y]]), Discs.of(movers(belief)), standing_world(belief)
         here_m = float(world.clearance_at(here)[0])
         gap_m = min(here_m, agents.gap_m(pose.x, pose.y)) - self._setup.robot_radius_m
         left_m = math.hypot(*(route.path_in_odom[-1] - here[0])) if not route.empty else 0.0

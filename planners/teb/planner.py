@@ -23,6 +23,7 @@ from planners.planner import Diagnostics, Drawing, Plan, PlannerSetup
 from planners.polyline import resample
 from planners.router import Route
 from planners.standing import Discs, StandingWorld, standing_world
+from planners.static_field import movers
 from planners.teb.band import Band, laid_along, taken_over
 from planners.teb.graph_kernels import Bounds, Ends, Scene, Weights
 from planners.teb.homotopy import Indices, detours, in_the_way, joined, sides, standing_discs
@@ -88,7 +89,7 @@ class ElasticBand:
         if here_m <= 0.0 or left_m < self._settings.arrival_m:
             self._band = None
             return Plan(BodyTwist(), diagnostics=ElasticBandDiagnostics(enclosed=here_m <= 0.0))
-        window, tracks = window_of(route.path_in_odom, pose, self._settings.look_ahead_m), Discs.of(belief.tracks)
+        window, tracks = window_of(route.path_in_odom, pose, self._settings.look_ahead_m), Discs.of(movers(belief))
         band, cost, ways = self._cheapest(pose, window, world, tracks, belief.twist)
         feasible = self._feasible(band, world, tracks)
         self._band = band if feasible else None

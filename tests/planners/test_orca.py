@@ -230,7 +230,7 @@ def test_a_robot_without_a_base_is_refused():
 
 
 def test_tracks_are_taken_out_of_what_stands():
-    wall, walker = Box(1.5, -2.0, 1.7, 2.0), Disc(0.0, 1.5, 0.3)
+    wall, walker = Box(1.5, -2.0, 1.7, 2.0), Disc(0.0, 1.5, 0.3, vx=0.5)
     belief = belief_of([wall, walker])
     seen = []
     Tracking(type("Spy", (), {"plan": lambda _, b, __: seen.append(b)})(), [walker]).plan(belief, None)
