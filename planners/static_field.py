@@ -13,6 +13,7 @@ from drivers.interface.samples import frozen_array
 from estimators.belief import F32, F64, OCCUPIED, Belief, Lattice, Mask, Track
 from estimators.clearance import distance_to
 from estimators.field_query import sample
+from planners.risk import extremes
 
 STILL_M_S = 0.2  # slower is within what a tracker makes of a post that the robot drives past
 GRID_M = 0.1  # a disc this near to occupied cells is in the grid
@@ -30,24 +31,18 @@ def movers(belief: Belief) -> tuple[Track, ...]:
     return tuple(track for track in belief.tracks if id(track) not in known)
 
 
-def static_cells(belief: Belief, margin_m: float) -> Mask | None:
-    """Return which cells are occupied and explained by no track, shape (rows, columns); None: no track explains any.
+def static_clearance(belief: Belief, margin_m: float) -> F32:
+    """Return the distance from each cell to the nearest occupied one that no track explains, shape (rows, columns) [m].
 
     A track explains the cells within its radius and the margin: it has a future of its own, and where it stood a moment ago is
     free when it has gone.  One that is not certain enough explains none.
     """
     discs = _discs(belief, margin_m)
     if not discs.size:
-        return None
+        return belief.clearance.clearance_m
     lattice = belief.grid.lattice
-    cells: Mask = _without(belief.grid.label, discs, lattice.x_m, lattice.y_m, lattice.cell_m)
-    return cells
-
-
-def static_clearance(belief: Belief, margin_m: float) -> F32:
-    """Return the distance from each cell to the nearest of the `static_cells`, shape (rows, columns) [m]."""
-    cells = static_cells(belief, margin_m)
-    return belief.clearance.clearance_m if cells is None else distance_to(cells, belief.grid.lattice.cell_m)
+    occupied: Mask = _without(belief.grid.label, discs, lattice.x_m, lattice.y_m, lattice.cell_m)
+    return distance_to(occupied, lattice.cell_m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +61,7 @@ def surroundings(belief: Belief, margin_m: float, reach_m: float, far_m: float) 
     amount.
     """
     grid, cell_m, pose = belief.grid.lattice, belief.grid.lattice.cell_m, belief.odom_from_base
-    half = math.ceil((reach_m + far_m) / cell_m) + 2
+    half = math.ceil(min(float(max(grid.rows, grid.columns)), (reach_m + far_m) / cell_m)) + 2
     top, bottom = _span((pose.y - grid.y_m) / cell_m, half, grid.rows)
     left, right = _span((pose.x - grid.x_m) / cell_m, half, grid.columns)
     lattice = Lattice(grid.x_m + left * cell_m, grid.y_m + top * cell_m, cell_m, bottom - top, right - left)
@@ -79,7 +74,9 @@ def surroundings(belief: Belief, margin_m: float, reach_m: float, far_m: float) 
 
 
 def _span(centre: float, half: int, count: int) -> tuple[int, int]:
-    """Return first and last but one of the indices around a centre, which is clamped to 0 to `count`."""
+    """Return first and last but one of the indices around a centre, which is clamped to 0 to `count`; of no place all."""
+    if not math.isfinite(centre):
+        return 0, count
     at = int(min(max(centre, 0.0), count - 1.0))
     return max(0, at - half), min(count, at + half + 1)
 
@@ -146,6 +143,9 @@ def near_distance(occupied: Mask, most: int, cell_m: float) -> F32:
         for c in range(columns):
             squared[most + c] = along[r, c] * along[r, c]
         least[:] = squared[most : most + columns]
+        if extremes(least)[0] == bound * bound:
+            distance[r] = bound * np.float32(cell_m)
+            continue
         for step in range(1, most):
             left, right, more = squared[most - step :], squared[most + step :], np.float32(step * step)
             for c in range(columns):

@@ -67,9 +67,10 @@ class VelocityLattice:
 
     def change_from(self, index: int) -> F64:
         """Return how far each command is from one of them, shape (commands,), in full speeds and turns."""
-        last, fastest, turn = self.twist(index), self.speed_m_s[-1], self.turn_rad_s[-1]
-        across = np.abs(self.turn_rad_s - last.wz) / turn
-        return np.asarray((np.abs(self.speed_m_s - last.vx)[:, None] / fastest + across).ravel())
+        speed, turn = divmod(index, len(self.turn_rad_s))
+        along = np.abs(self.speed_m_s - self.speed_m_s[speed]) / self.speed_m_s[-1]
+        across = np.abs(self.turn_rad_s - self.turn_rad_s[turn]) / self.turn_rad_s[-1]
+        return np.asarray((along[:, None] + across).ravel())
 
     def twist(self, index: int) -> BodyTwist:
         """Return a command."""
@@ -128,12 +129,18 @@ class Rollouts(NamedTuple):
     brakable: NDArray[np.bool_]  # (commands,): it can stop in time where it has to
 
 
+def path_of(rolled: Rollouts, command: int) -> F64:
+    """Return where one command leads, shape (steps, 2), in odom."""
+    path = np.empty((rolled.x.shape[1], 2))
+    path[:, 0], path[:, 1] = rolled.x[command], rolled.y[command]
+    return path
+
+
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _never_seen(around: Ground, x: float, y: float) -> bool:
-    """Return whether a point lies in a cell that was never seen; outside of the grid none was."""
-    row, column = int(np.floor((y - around.corner_y) / around.cell_m)), int(np.floor((x - around.corner_x) / around.cell_m))
-    rows, columns = around.label.shape
-    return not (0 <= row < rows and 0 <= column < columns) or around.label[row, column] == UNKNOWN
+def _never_seen(label: NDArray[np.uint8], columns: float, rows: float) -> bool:
+    """Return whether a point, in cells from the lower corner, lies in a cell that was never seen; outside none was."""
+    inside = 0.0 <= rows < label.shape[0] and 0.0 <= columns < label.shape[1]
+    return not inside or label[np.uint32(rows), np.uint32(columns)] == UNKNOWN
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -183,7 +190,7 @@ def roll_out(pose: F64, now: F64, speeds: F64, turns: F64, drive: Drive, step_s:
     cosine, sine, heading = np.empty(steps), np.empty(steps), np.empty(steps)
     here = bilinear(around.clearance, around.corner_x, around.corner_y, around.cell_m, pose[0], pose[1]) - around.radius_m
     least = min(around.hold_m, here - _SPARE_M)
-    far = max(around.far_m, around.hold_m)
+    far, label, per_cell = max(around.far_m, around.hold_m), around.label, 1.0 / around.cell_m
     for j in range(len(turns)):
         angle = pose[2]
         for k in range(steps):
@@ -202,7 +209,8 @@ def roll_out(pose: F64, now: F64, speeds: F64, turns: F64, drive: Drive, step_s:
                     if free < 0.0:
                         c = bilinear(around.clearance, around.corner_x, around.corner_y, around.cell_m, nx, ny) - around.radius_m
                         free = (c - far) / _STEEPEST
-                    blind = 0.0 <= around.body_m < travelled + abs(forward) and _never_seen(around, nx, ny)
+                    blind = 0.0 <= around.body_m < travelled + abs(forward)
+                    blind = blind and _never_seen(label, (nx - around.corner_x) * per_cell, (ny - around.corner_y) * per_cell)
                     if c < least or blind:
                         driven = k
                     else:

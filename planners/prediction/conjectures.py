@@ -120,7 +120,8 @@ class ConjectureFamily:
 
     def sample_with_draws(self, occasion: Occasion, chance: Chance) -> tuple[Futures, Draws]:
         """Return the futures and what they were made from, for futures beside other motions of the robot."""
-        steps_s = np.diff(occasion.times_s, prepend=0.0)
+        steps_s = occasion.times_s.copy()
+        steps_s[1:] -= occasion.times_s[:-1]
         draws, which = self.draw(len(steps_s), occasion.scenarios, chance)
         position = propagate(draws, steps_s, occasion.robot_in_odom.astype(np.float32))
         return Futures(position, self._seen.radius_m, which), draws

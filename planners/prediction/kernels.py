@@ -36,11 +36,13 @@ class Draws(NamedTuple):
 HOLD = 13  # steps
 
 
-@njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "arcp", "nsz"})  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})  # type: ignore[untyped-decorator]
 def advance(draws: Draws, m: int, steps_s: F64, robot: F32, out: F32) -> None:
     """Write where obstacle m is after each step, in every scenario, into out, shape (steps, 2, scenarios).
 
-    A loop that writes one array is vectorised; one that writes more is not, as there are too many pairs that might overlap.
+    Near the robot it goes on with a share of its velocity, `along`, and makes `towards` of the way to the robot per second.  A
+    loop that writes one array is vectorised; one that writes more is not, as there are too many pairs that might overlap, nor
+    one that looks out for a division by zero.
 
     Args:
         draws: starts and coefficients.
@@ -49,50 +51,42 @@ def advance(draws: Draws, m: int, steps_s: F64, robot: F32, out: F32) -> None:
         robot: where the robot is at the end of each, shape (steps, 2); the reaction is to where it is at the end before.
         out: futures of this obstacle.
     """
-    n = draws.position.shape[2]
-    x, y = draws.position[m, 0], draws.position[m, 1]
+    n, push, strength = draws.position.shape[2], draws.push[m], draws.acceleration[m]
+    x, y = draws.position[m, 0].copy(), draws.position[m, 1].copy()
     vx, vy = draws.velocity[m, 0].copy(), draws.velocity[m, 1].copy()
-    strength, along, towards = draws.acceleration[m], draws.speed_factor[m].copy(), np.zeros(n, np.float32)
-    away = np.empty(n, np.float32)
-    reacts = (np.abs(draws.slowing[m]) + np.abs(draws.pursuit[m])).max() > 0.0
-    for k in range(len(steps_s)):
-        dt, rx, ry = np.float32(steps_s[k]), robot[max(k - 1, 0), 0], robot[max(k - 1, 0), 1]
-        push_x, push_y = draws.push[m, k // HOLD * 2], draws.push[m, k // HOLD * 2 + 1]
-        if reacts:
-            react(draws, m, x, y, vx, vy, rx, ry, away, along, towards)
-        next_x, next_y = out[k, 0], out[k, 1]
-        for i in range(n):
-            next_x[i] = x[i] + (along[i] * vx[i] + towards[i] * (rx - x[i])) * dt
-        for i in range(n):
-            next_y[i] = y[i] + (along[i] * vy[i] + towards[i] * (ry - y[i])) * dt
-        for i in range(n):
-            vx[i] += push_x[i] * strength[i] * dt
-        for i in range(n):
-            vy[i] += push_y[i] * strength[i] * dt
-        x, y = next_x, next_y
-
-
-@njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "arcp", "nsz"})  # type: ignore[untyped-decorator]
-def react(
-    draws: Draws, m: int, x: F32, y: F32, vx: F32, vy: F32, rx: np.float32, ry: np.float32, away: F32, along: F32, towards: F32
-) -> None:
-    """Write the share of its velocity that an obstacle goes on with, and what of the way to the robot it makes per second."""
-    zero, one, near = np.float32(0.0), np.float32(1.0), np.float32(_NEAR)
     factor, slowing, pursuit, least = draws.speed_factor[m], draws.slowing[m], draws.pursuit[m], draws.least_speed[m]
+    along, away, towards = factor.copy(), np.empty(n, np.float32), np.zeros(n, np.float32)
     edge, slope = draws.contact_m[m] + np.float32(draws.range_m), np.float32(1.0 / draws.range_m)
-    for i in range(len(x)):
-        dx, dy = rx - x[i], ry - y[i]
-        away[i] = np.sqrt(dx * dx + dy * dy)
-    for i in range(len(x)):
-        g = (edge - away[i]) * slope
-        g = zero if g < zero else (one if g > one else g)
-        speed = np.sqrt(vx[i] * vx[i] + vy[i] * vy[i])
-        speed = least[i] if speed < least[i] else speed
-        towards[i] = pursuit[i] * g * speed / (away[i] + near)
-    for i in range(len(x)):
-        g = (edge - away[i]) * slope
-        g = zero if g < zero else (one if g > one else g)
-        along[i] = factor[i] + slowing[i] * g
+    zero, one, near = np.float32(0.0), np.float32(1.0), np.float32(_NEAR)
+    reacts = (np.abs(slowing) + np.abs(pursuit)).max() > 0.0
+    for k in range(len(steps_s)):
+        dt, rx, ry, hold = np.float32(steps_s[k]), robot[max(k - 1, 0), 0], robot[max(k - 1, 0), 1], k // HOLD * 2
+        if reacts:
+            for i in range(n):
+                dx, dy = rx - x[i], ry - y[i]
+                away[i] = np.sqrt(dx * dx + dy * dy)
+            for i in range(n):
+                g = (edge - away[i]) * slope
+                g = zero if g < zero else (one if g > one else g)
+                along[i] = factor[i] + slowing[i] * g
+            for i in range(n):
+                g = (edge - away[i]) * slope
+                g = zero if g < zero else (one if g > one else g)
+                speed = np.sqrt(vx[i] * vx[i] + vy[i] * vy[i])
+                speed = least[i] if speed < least[i] else speed
+                towards[i] = pursuit[i] * g * speed / (away[i] + near)
+        for i in range(n):
+            x[i] += (along[i] * vx[i] + towards[i] * (rx - x[i])) * dt
+        for i in range(n):
+            y[i] += (along[i] * vy[i] + towards[i] * (ry - y[i])) * dt
+        for i in range(n):
+            vx[i] += push[hold, i] * strength[i] * dt
+        for i in range(n):
+            vy[i] += push[hold + 1, i] * strength[i] * dt
+        for i in range(n):
+            out[k, 0, i] = x[i]
+        for i in range(n):
+            out[k, 1, i] = y[i]
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

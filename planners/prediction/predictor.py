@@ -33,7 +33,7 @@ class Occasion:
     """What futures are asked for: when, beside which motion of the robot, and how many."""
 
     times_s: F64  # (steps,), after the belief, increasing
-    robot_in_odom: F64 | F32  # (steps, 2), where the robot is meant to be at those times; some predictions react to it
+    robot_in_odom: F64  # (steps, 2), where the robot is meant to be at those times; some predictions react to it
     scenarios: int
 
 

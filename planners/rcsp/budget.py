@@ -21,7 +21,7 @@ def affordable(settings: BudgetSettings, budget_ns: int | None, distances: int, 
     >>> affordable(BudgetSettings(), 2_000_000, 165 * 25 * 6, reacting=False)
     128
     >>> affordable(BudgetSettings(), 1_000_000, 165 * 25 * 6, reacting=False)
-    16
+    48
     >>> affordable(BudgetSettings(), 100_000, 165 * 25 * 6, reacting=False)
     0
     """

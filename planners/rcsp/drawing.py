@@ -6,7 +6,7 @@ import numpy as np
 
 from estimators.belief import F32
 from planners.planner import Drawing, no_path
-from planners.rcsp.drawing_kernels import by_conjecture, by_rank, first_conflict
+from planners.rcsp.drawing_kernels import by_conjecture, by_objective, first_conflict
 from planners.rcsp.evaluation import Evaluation
 from planners.velocity_lattice import Rollouts
 
@@ -24,8 +24,9 @@ def commitment_step(rolled: Rollouts, command: int, position: F32, contact: F32,
 
 def drawn(rolled: Rollouts, told: Evaluation, names: tuple[str, ...], keenest: int, commitment: int) -> tuple[Drawing, ...]:
     """Return the layers: dots along candidates in thirds of their objective, dots of futures, the point of no return."""
-    order = np.argsort(-told.objective, kind="stable")
-    ends, parts = by_rank(rolled.x, rolled.y, order, told.free, len(GROUPS) - 1)
+    falling, third = np.sort(told.objective)[::-1], len(told.objective) // 3
+    limits = np.array((falling[third - 1], falling[2 * third - 1], -np.inf))
+    ends, parts = by_objective(rolled.x, rolled.y, told.objective, told.free, limits)
     candidates = [Drawing(name, ends[parts[k] : parts[k + 1]], connected=False) for k, name in enumerate(GROUPS)]
     dots, edges = by_conjecture(told.futures.position_in_odom, told.futures.conjecture, len(names), EVERY, SHOWN)
     futures = [Drawing(f"futures_{name}", dots[edges[k] : edges[k + 1]], connected=False) for k, name in enumerate(names)]

@@ -46,16 +46,18 @@ def by_conjecture(
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def by_rank(x: F32, y: F32, order: NDArray[np.int64], free: NDArray[np.bool_], thirds: int) -> tuple[F64, NDArray[np.int64]]:
-    """Return the ends of the motions, shape (commands, 2), the free ones by thirds of their order, then the others; and the
-    edges of these groups, shape (thirds + 2,).
+def by_objective(x: F32, y: F32, objective: F64, free: NDArray[np.bool_], limits: F64) -> tuple[F64, NDArray[np.int64]]:
+    """Return the ends of the motions, shape (commands, 2), the free ones by the first of the limits, which fall, that their
+    objective reaches, then the others; and the edges of these groups, shape (limits + 2,).
     """
-    count, last = len(order), x.shape[1] - 1
-    ends, edges, at = np.empty((count, 2)), np.zeros(thirds + 2, np.int64), 0
-    for group in range(thirds + 1):
-        for rank in range(count):
-            u = order[rank]
-            if (min(rank // max(count // thirds, 1), thirds - 1) if free[u] else thirds) == group:
+    count, groups, last = len(objective), len(limits) + 1, x.shape[1] - 1
+    ends, edges, at = np.empty((count, 2)), np.zeros(groups + 1, np.int64), 0
+    for group in range(groups):
+        for u in range(count):
+            own = 0
+            while own < groups - 1 and (not free[u] or objective[u] < limits[own]):
+                own += 1
+            if own == group:
                 ends[at, 0], ends[at, 1] = x[u, last], y[u, last]
                 at += 1
         edges[group + 1] = at

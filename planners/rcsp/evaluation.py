@@ -25,7 +25,7 @@ from planners.rcsp.kernels import (
 )
 from planners.rcsp.settings import RcspSettings, RiskSettings
 from planners.risk import objective_error, tail_count
-from planners.velocity_lattice import Rollouts
+from planners.velocity_lattice import Rollouts, path_of
 
 KINDS = {"inverse_clearance": INVERSE_CLEARANCE, "violation": VIOLATION, "near_miss": NEAR_MISS}
 REWARD_RANGE = 2.0  # B_R: rewards are cut to [-1, 1]
@@ -52,7 +52,8 @@ class Evaluation:
         """
         if self.free.any():
             return int(np.argmax(np.where(self.free, self.objective, -np.inf))), True
-        return int(np.lexsort((effort, np.round(self.risk, 6)))[0]), False
+        risk = np.rint(1e6 * self.risk)
+        return int(np.argmin(np.where(risk == risk.min(), effort, np.inf))), False
 
 
 class Evaluator:
@@ -80,13 +81,12 @@ class Evaluator:
             chance: what futures are drawn from.
         """
         s = self._settings
-        robot = np.stack((rolled.x[nominal], rolled.y[nominal]), axis=1)
-        futures, clearance = self._held_against(rolled, robot, scenarios, chance)
+        futures, clearance = self._held_against(rolled, path_of(rolled, nominal), scenarios, chance)
         tail = tail_of(s.risk, scenarios)
         risk, room_m, free = tails(clearance, rolled.static_m, rolled.brakable, tail, self._risk, s.risk.static_safe_m)
         return Evaluation(reward - s.risk.weight * risk, reward, risk, room_m, free, clearance, futures, tail)
 
-    def _held_against(self, rolled: Rollouts, robot: F32, scenarios: int, chance: Chance) -> tuple[Futures, F32]:
+    def _held_against(self, rolled: Rollouts, robot: F64, scenarios: int, chance: Chance) -> tuple[Futures, F32]:
         far_m, predictor = self._settings.risk.safe_m, self._predictor
         occasion = Occasion(self._times_s, robot, scenarios)
         if self._settings.reaction == "candidate" and isinstance(predictor, ConjectureFamily):

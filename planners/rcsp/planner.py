@@ -32,10 +32,10 @@ from planners.rcsp.rehearsal import rehearse
 from planners.rcsp.settings import RcspSettings
 from planners.router import Route
 from planners.static_field import movers, surroundings
-from planners.velocity_lattice import Drive, Ground, Rollouts, VelocityLattice, after_latency, roll_out
+from planners.velocity_lattice import Drive, Ground, Rollouts, VelocityLattice, after_latency, path_of, roll_out
 
 _SPACING_M = 0.12  # of the points of the route that progress is measured along
-_FIELD_SPARE_M = 0.25  # what the clearance is known beyond where it matters, so that it need not be looked up at every step
+_FIELD_SPARE_M = 0.15  # what the clearance is known beyond where it matters, so that it need not be looked up at every step
 _ROUTE_SPARE_M = 1.0  # how much farther along than a rollout reaches
 
 
@@ -140,7 +140,7 @@ class Rcsp:
             r.lateral, r.heading_m_per_rad, r.look_ahead_m,
         )  # fmt: skip
         cost = self._reverse_cost + r.change * self._lattice.change_from(self._last)
-        return np.asarray(np.clip(made_m / reach_m - cost, -1.0, 1.0))
+        return np.asarray(np.minimum(np.maximum(made_m / reach_m - cost, -1.0), 1.0))
 
     def _plan(self, belief: Belief, rolled: Rollouts, told: Evaluation, free: bool, budget_ns: int | None) -> Plan:
         chosen = self._last
@@ -169,12 +169,11 @@ class Rcsp:
                 if name != "random_walk"
             },
         )
-        path = np.stack((rolled.x[chosen], rolled.y[chosen]), axis=1).astype(np.float64)
         twist = self._lattice.twist(chosen)
         latency_ns = round(self._settings.lattice.latency_s * 1e9)
         return Plan(
             twist,
-            path_in_odom=path,
+            path_in_odom=path_of(rolled, chosen),
             diagnostics=said,
             latency_ns=latency_ns,
             drawings=drawn(rolled, told, self._predictor.conjectures, keenest, commitment),

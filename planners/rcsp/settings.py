@@ -44,12 +44,12 @@ class BudgetSettings(Settings):
 
     scenarios: int = Field(default=128, ge=1, le=4096, description="N, where the tick has time for them")
     scenarios_min: int = Field(default=8, ge=1, le=4096, description="with time for fewer it stands")
-    fixed_us: float = Field(default=600.0, ge=0.0, le=1e6, description="of a decision, whatever the count")
+    fixed_us: float = Field(default=500.0, ge=0.0, le=1e6, description="of a decision, whatever the count")
     distance_ns: float = Field(
-        default=0.25, gt=0.0, le=1000.0, description="of one distance of robot and obstacle, in one step of one scenario"
+        default=0.16, gt=0.0, le=1000.0, description="of one distance of robot and obstacle, in one step of one scenario"
     )
     reacting_distance_ns: float = Field(
-        default=4.0, gt=0.0, le=1000.0, description="of the same where obstacles react to each candidate"
+        default=1.6, gt=0.0, le=1000.0, description="of the same where obstacles react to each candidate"
     )
     share: float = Field(default=0.7, gt=0.0, le=1.0, description="of the time left that it may take")
 

@@ -21,7 +21,7 @@ from planners.planner import Diagnostics, Drawing
 from planners.shield import Filtered, ReachableSet, ShieldSetup
 from planners.shields.lattice_kernels import Local, forecast
 from planners.static_field import movers as movers_of
-from planners.static_field import static_clearance
+from planners.static_field import surroundings
 from planners.velocity_lattice import LatticeSettings, VelocityLattice
 
 F64 = NDArray[np.float64]
@@ -111,14 +111,17 @@ class LatticeShield:
         return np.concatenate((own, self._twists))
 
     def _forecast(self, belief: Belief, twists: F64) -> tuple[F64, F64, float]:
-        s, pose, now, lattice = self._settings, belief.odom_from_base, belief.twist, belief.clearance.lattice
+        s, pose, now = self._settings, belief.odom_from_base, belief.twist
         movers = [
             (*track.position_in_odom, *track.velocity_in_odom, track.radius_m + self._radius_m) for track in movers_of(belief)
         ]
         known = np.array(movers).reshape(-1, 5)
         known = known[np.isfinite(known).all(axis=1)]
-        field = static_clearance(belief, s.track_margin_m)
-        local = Local(field, lattice.x_m, lattice.y_m, lattice.cell_m, known, self._radius_m, s.far_m)
+        fastest = max(math.hypot(now.vx, now.vy), math.sqrt(float((twists[:, :2] ** 2).sum(axis=1).max())))
+        reach_m = fastest * (s.lattice.latency_s + s.horizon_s)
+        near = surroundings(belief, s.track_margin_m, reach_m, s.far_m + self._radius_m)
+        at = near.lattice
+        local = Local(near.clearance_m, at.x_m, at.y_m, at.cell_m, known, self._radius_m, s.far_m)
         told: tuple[F64, F64, float] = forecast(
             np.array([pose.x, pose.y, pose.yaw]), np.array([now.vx, now.vy, now.wz]), twists, self._acceleration,
             s.lattice.latency_s, s.lattice.response_s, s.horizon_s / s.steps, s.steps, local,

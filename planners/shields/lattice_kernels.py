@@ -35,9 +35,39 @@ def clearance_at(local: Local, x: float, y: float, time_s: float) -> float:
     least = bilinear(local.clearance, local.corner_x, local.corner_y, local.cell_m, x, y) - local.radius_m
     for i in range(len(local.movers)):
         o = local.movers[i]
-        least = min(least, np.hypot(o[0] + time_s * o[2] - x, o[1] + time_s * o[3] - y) - o[4])
+        dx, dy = o[0] + time_s * o[2] - x, o[1] + time_s * o[3] - y
+        least = min(least, np.sqrt(dx * dx + dy * dy) - o[4])
     capped: float = min(least, local.far_m)
     return capped
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def courses(
+    yaw: float, now: float, turns: F64, acceleration: float, latency_s: float, response_s: float, step_s: float, steps: int
+) -> tuple[F64, NDArray[np.int64]]:
+    """Return cosine and sine of the heading in the middle of each step, shape (n, steps + 1, 2), and the row of each turn, (n,).
+
+    They follow from the turn alone, and twists of a lattice share theirs: those of a turn that comes again stand in the row of
+    the first.  The arguments are those of `forecast`.
+    """
+    share = 1.0 - np.exp(-step_s / response_s) if response_s > 0.0 else 1.0
+    course, row = np.empty((len(turns), steps + 1, 2)), np.empty(len(turns), np.int64)
+    for i in range(len(turns)):
+        row[i] = 0
+        while row[i] < i and turns[row[i]] != turns[i]:
+            row[i] += 1
+        if row[i] < i:
+            continue
+        angle, turn = yaw, now
+        for k in range(steps + 1):
+            dt = latency_s if k == 0 else step_s
+            if k > 0:
+                most = acceleration * dt
+                turn += min(max((turns[i] - turn) * share, -most), most)
+            heading = angle + 0.5 * turn * dt
+            course[i, k, 0], course[i, k, 1] = np.cos(heading), np.sin(heading)
+            angle += turn * dt
+    return course, row
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -58,25 +88,24 @@ def forecast(
         steps: likewise.
         local: surroundings.
     """
+    course, like = courses(pose[2], now[2], twists[:, 2].copy(), acceleration[2], latency_s, response_s, step_s, steps)
     share = 1.0 - np.exp(-step_s / response_s) if response_s > 0.0 else 1.0
     least, end = np.empty(len(twists)), np.empty((len(twists), 2))
     here = clearance_at(local, pose[0], pose[1], 0.0)
-    velocity = np.empty(3)
+    velocity = np.empty(2)
     for i in range(len(twists)):
-        x, y, yaw, time_s = pose[0], pose[1], pose[2], 0.0
-        velocity[:] = now
+        x, y, time_s = pose[0], pose[1], 0.0
+        velocity[:] = now[:2]
         least[i] = np.inf
         for k in range(steps + 1):
             dt = latency_s if k == 0 else step_s
             if k > 0:
-                for axis in range(3):
+                for axis in range(2):
                     most = acceleration[axis] * dt
                     velocity[axis] += min(max((twists[i, axis] - velocity[axis]) * share, -most), most)
-            heading = yaw + 0.5 * velocity[2] * dt
-            c, s = np.cos(heading), np.sin(heading)
+            c, s = course[like[i], k, 0], course[like[i], k, 1]
             x += (c * velocity[0] - s * velocity[1]) * dt
             y += (s * velocity[0] + c * velocity[1]) * dt
-            yaw += velocity[2] * dt
             time_s += dt
             least[i] = min(least[i], clearance_at(local, x, y, time_s))
         end[i, 0], end[i, 1] = x, y

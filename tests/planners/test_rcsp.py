@@ -185,7 +185,7 @@ def test_a_count_from_a_budget_gives_the_commands_of_the_same_count_fixed():
     assert isinstance(hurried, Anytime)
     for tick in range(1, 15):
         belief = belief_with(track(2.0 - 0.02 * tick, 0.2, -0.4), track(3.0, -0.5, 0.0, 0.2, identity=4), tick=tick)
-        one, other = hurried.plan_within(belief, straight(belief), 1_050_000), fixed.plan(belief, straight(belief))
+        one, other = hurried.plan_within(belief, straight(belief), 840_000), fixed.plan(belief, straight(belief))
         assert one.diagnostics.scenarios == other.diagnostics.scenarios == 64
         assert one.base == other.base
         assert facts(one.path_in_odom) == facts(other.path_in_odom)
