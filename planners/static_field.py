@@ -31,18 +31,24 @@ def movers(belief: Belief) -> tuple[Track, ...]:
     return tuple(track for track in belief.tracks if id(track) not in known)
 
 
-def static_clearance(belief: Belief, margin_m: float) -> F32:
-    """Return the distance from each cell to the nearest occupied one that no track explains, shape (rows, columns) [m].
+def static_cells(belief: Belief, margin_m: float) -> Mask | None:
+    """Return which cells are occupied and explained by no track, shape (rows, columns); None: no track explains any.
 
     A track explains the cells within its radius and the margin: it has a future of its own, and where it stood a moment ago is
     free when it has gone.  One that is not certain enough explains none.
     """
     discs = _discs(belief, margin_m)
     if not discs.size:
-        return belief.clearance.clearance_m
+        return None
     lattice = belief.grid.lattice
-    occupied: Mask = _without(belief.grid.label, discs, lattice.x_m, lattice.y_m, lattice.cell_m)
-    return distance_to(occupied, lattice.cell_m)
+    cells: Mask = _without(belief.grid.label, discs, lattice.x_m, lattice.y_m, lattice.cell_m)
+    return cells
+
+
+def static_clearance(belief: Belief, margin_m: float) -> F32:
+    """Return the distance from each cell to the nearest of the `static_cells`, shape (rows, columns) [m]."""
+    cells = static_cells(belief, margin_m)
+    return belief.clearance.clearance_m if cells is None else distance_to(cells, belief.grid.lattice.cell_m)
 
 
 @dataclass(frozen=True, slots=True)
