@@ -100,7 +100,7 @@ def test_it_does_not_commit_to_a_gap_that_closes():
 
 def test_far_from_everybody_it_drives_fast_and_straight():
     plan = planned(twist=BodyTwist(0.7, 0.0, 0.0))
-    assert plan.base.vx == 0.6
+    assert plan.base.vx == pytest.approx(0.75)  # of the 0.8 m/s, what it can be at by then
     assert abs(plan.base.wz) < 0.25
     assert plan.latency_ns == 50_000_000
 
