@@ -76,7 +76,7 @@ class Planner(Stateful, Protocol):
         ...
 
     def plan(self, belief: Belief, route: Route) -> Plan:
-        """Return what to do now.  An empty route means: stand still."""
+        """Return what to do now.  An empty route means: stand still; where it is blocked, turning to look is allowed."""
         ...
 
 

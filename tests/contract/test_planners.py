@@ -54,7 +54,9 @@ def test_stands_without_a_route(name, base, blocked):
     for index, belief in enumerate(beliefs(base)):
         if index % 3 == 0:
             planner.plan(belief, routes(base)[index])  # it was on its way
-        assert planner.plan(belief, Route(goal, no_path(), 0.0, blocked)).base in {None, BodyTwist()}
+        asked = planner.plan(belief, Route(goal, no_path(), 0.0, blocked)).base or BodyTwist()
+        assert (asked.vx, asked.vy) == (0.0, 0.0)
+        assert blocked or asked.wz == 0.0  # while its way is blocked it may turn, to look whether it still is
 
 
 @pytest.mark.parametrize("base", BASES)
