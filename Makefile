@@ -26,6 +26,10 @@ picture: $(STAMP)  ## make the README's pictures (needs a Vulkan driver; a softw
 	$(BIN)/trundle run dynamic_hallway --seed 1 --set planner.name=point_ds --log runs/recorded.rrd --force
 	$(BIN)/trundle replay runs/recorded.rrd --planner dwa --log runs/counterfactual.rrd --force || [ $$? -eq 1 ]
 	$(BIN)/trundle review runs/counterfactual.rrd --at 216 --screenshot docs/counterfactual.png
+	$(BIN)/trundle run dynamic_bottleneck --seed 4 --set planner.name=dwa --log runs/trap.rrd --force || [ $$? -eq 1 ]
+	$(BIN)/trundle review runs/trap.rrd --at 346 --screenshot docs/trap.png
+	$(BIN)/trundle run dynamic_bottleneck --seed 4 --set planner.name=rcsp --log runs/waiting.rrd --force
+	$(BIN)/trundle review runs/waiting.rrd --at 112 --screenshot docs/waiting.png
 
 test: lint  ## what CI runs: format, lint, types, layers, tests
 	$(BIN)/python -m pytest -n 2
