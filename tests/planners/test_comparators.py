@@ -15,7 +15,7 @@ from planners.router import Route
 from planners.teb.planner import ElasticBand
 from tests.contract.facts import all_finite, arrays, facts, forget_kernels, signatures
 from tests.planners.synthetic import Box, Disc, belief_of, mission_to
-from tests.planners.tracked import planner_of, straight_router, tracks_of
+from tests.planners.tracked import WALLS, planner_of, route_from, run, straight_router, tracks_of
 
 COMPARATORS = pytest.mark.parametrize("kind", [BarrierMpc, ReciprocalAvoidance, ElasticBand])
 WALKERS = [Disc(3.5, 0.3, 0.25, -0.6, 0.0), Disc(2.6, -1.2, 0.25, 0.0, 0.7), Disc(0.0, 1.0, 0.25, 0.5, 0.0)]
@@ -86,3 +86,37 @@ def test_the_same_world_turned_gives_the_same_command(kind):
         plan = planner_of(kind).plan(belief, straight_router().route(belief, mission_to(4.0 * c, 4.0 * s)))
         asked.append([plan.base.vx, plan.base.wz])
     assert asked[0] == pytest.approx(asked[1], abs=0.05)
+
+
+@COMPARATORS
+def test_inside_an_obstacle_it_stands_and_says_so(kind):
+    belief = belief_of([Disc(0.0, 0.0, 0.5)])
+    plan = planner_of(kind).plan(belief, route_from(belief, 4.0, 0.0))
+    assert plan.base == BodyTwist()
+    assert plan.diagnostics.enclosed
+
+
+@COMPARATORS
+def test_without_a_route_it_stands(kind):
+    plan = planner_of(kind).plan(belief_of([]), Route(None, np.zeros((0, 2)), 0.0))
+    assert plan.base == BodyTwist()
+
+
+@pytest.mark.parametrize(("kind", "within_m_s"), [(BarrierMpc, 0.05), (ElasticBand, 0.06)])
+@pytest.mark.parametrize(
+    ("standing", "movers", "goal"),
+    [
+        ([], [], (3.0, 0.0)),
+        ([], [], (-2.0, 0.5)),
+        ([Disc(1.7, 0.05, 0.3)], [], (3.5, 0.0)),
+        ([Box(1.5, -3, 1.7, -0.6), Box(1.5, 0.6, 1.7, 3)], [], (3.0, 0.0)),
+        (WALLS, [Disc(5.0, 0.1, 0.25, -0.6)], (5.0, 0.0)),
+        ([], [Disc(2.5, -2.2, 0.25, 0.0, 0.8)], (4.5, 0.0)),
+    ],
+    ids=["open", "behind", "pillar", "gap", "head-on", "crossing"],
+)
+def test_it_arrives_without_touching(kind, within_m_s, standing, movers, goal):
+    trace = run(planner_of(kind), standing, movers, goal)
+    assert trace.reached(*goal)
+    assert trace.min_clearance_m > 0.05
+    assert max(twist.speed_m_s for twist in trace.twists) == pytest.approx(0.8, abs=within_m_s)

@@ -11,11 +11,9 @@ from planners.mpc_cbf.kernels import barriers, fall, linearised, rollout
 from planners.mpc_cbf.planner import BarrierMpc
 from planners.mpc_cbf.program import FAR, BarrierProgram, Costs, Subproblem
 from planners.mpc_cbf.reference import ahead_of, reference
-from planners.router import Route
-from tests.planners.synthetic import OMNI, Box, Disc, belief_of, mission_to
-from tests.planners.tracked import JACKAL, Tracking, planner_of, run, straight_router
+from tests.planners.synthetic import OMNI, Box, Disc, belief_of
+from tests.planners.tracked import JACKAL, WALLS, Tracking, planner_of, route_from, run, straight_router
 
-WALLS = [Box(-1, -1.5, 9, -1.4), Box(-1, 1.4, 9, 1.5)]
 STEP_S, MARGIN_M = 0.1, 0.07
 START = np.array([0.3, -0.2, 0.7])
 
@@ -138,25 +136,6 @@ def test_reference_begins_at_the_nearest_point_of_the_route():
     assert ahead_of(np.array([1.0, 0.0]), path[:1]).tolist() == [[1.0, 0.0], [0.0, 0.0]]
 
 
-@pytest.mark.parametrize(
-    ("standing", "movers", "goal"),
-    [
-        ([], [], (3.0, 0.0)),
-        ([], [], (-2.0, 0.5)),
-        ([Disc(1.7, 0.05, 0.3)], [], (3.5, 0.0)),
-        ([Box(1.5, -3, 1.7, -0.6), Box(1.5, 0.6, 1.7, 3)], [], (3.0, 0.0)),
-        (WALLS, [Disc(5.0, 0.1, 0.25, -0.6)], (5.0, 0.0)),
-        ([], [Disc(2.5, -2.2, 0.25, 0.0, 0.8)], (4.5, 0.0)),
-    ],
-    ids=["open", "behind", "pillar", "gap", "head-on", "crossing"],
-)
-def test_it_arrives_without_touching(standing, movers, goal):
-    trace = run(planner_of(BarrierMpc), standing, movers, goal)
-    assert trace.reached(*goal)
-    assert trace.min_clearance_m > 0.05
-    assert max(twist.speed_m_s for twist in trace.twists) == pytest.approx(0.8, abs=0.05)
-
-
 def test_barriers_fall_no_faster_than_they_may_along_every_prediction_and_on_the_way():
     walker = Disc(5.0, 0.3, 0.3, -0.3)
     planner = planner_of(BarrierMpc)
@@ -181,10 +160,6 @@ def test_a_barrier_that_may_fall_slower_brakes_earlier():
     assert nearest[0] > nearest[1] + 0.1
 
 
-def route_from(belief, *goal):
-    return straight_router().route(belief, mission_to(*goal))
-
-
 def test_a_solution_that_is_none_is_not_driven():
     belief = belief_of(WALLS, twist=BodyTwist(0.8, 0.0, 0.0))
     walkers = [Disc(1.2, 0.2, 0.3, -0.8), Disc(1.0, -0.8, 0.3, 0.0, 0.5)]
@@ -201,18 +176,6 @@ def test_no_way_out_softens_the_barriers_and_says_so():
     plan = Tracking(planner_of(BarrierMpc), around).plan(belief, route_from(belief, 4.0, 0.0))
     assert plan.base.finite
     assert plan.diagnostics.worst_fall_m > 0.0 or not plan.diagnostics.solved
-
-
-def test_inside_an_obstacle_it_stands_and_says_so():
-    belief = belief_of([Disc(0.0, 0.0, 0.5)])
-    plan = planner_of(BarrierMpc).plan(belief, route_from(belief, 4.0, 0.0))
-    assert plan.base == BodyTwist()
-    assert plan.diagnostics.enclosed
-
-
-def test_without_a_route_it_stands():
-    plan = planner_of(BarrierMpc).plan(belief_of([]), Route(None, np.zeros((0, 2)), 0.0))
-    assert plan.base == BodyTwist()
 
 
 def test_a_base_that_may_not_reverse_does_not():

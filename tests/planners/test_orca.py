@@ -9,13 +9,11 @@ from planners.orca.half_plane_kernels import agent_half_planes, standing_half_pl
 from planners.orca.nonholonomic import followable, followed, tracking_error_m
 from planners.orca.planner import ReciprocalAvoidance
 from planners.orca.program_kernels import choose_velocity, least_violation, nearest_inside
-from planners.router import Route
 from planners.shields.plane_qp import solve
 from planners.standing import boundary_points, standing_world
-from tests.planners.synthetic import OMNI, Box, Disc, belief_of, mission_to
-from tests.planners.tracked import JACKAL, Tracking, planner_of, run, straight_router
+from tests.planners.synthetic import OMNI, Box, Disc, belief_of
+from tests.planners.tracked import JACKAL, WALLS, Tracking, planner_of, route_from, run
 
-WALLS = [Box(-1, -1.5, 9, -1.4), Box(-1, 1.4, 9, 1.5)]
 BOX = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]]), np.full(4, -1.0)  # |v| <= 1 along each axis
 
 
@@ -189,28 +187,12 @@ def test_a_track_is_avoided_earlier_than_the_same_walker_in_the_grid_alone():
     assert seen.min_clearance_m > unseen.min_clearance_m
 
 
-def route_from(belief, *goal):
-    return straight_router().route(belief, mission_to(*goal))
-
-
 def test_agents_that_leave_nothing_are_granted_the_least_violation():
     around = [Disc(0.7 * math.cos(a), 0.7 * math.sin(a), 0.25, -math.cos(a), -math.sin(a)) for a in np.linspace(0, 6, 9)]
     belief = belief_of(around)
     plan = Tracking(planner_of(ReciprocalAvoidance), around).plan(belief, route_from(belief, 4.0, 0.0))
     assert plan.diagnostics.violation_m_s > 0.0
     assert plan.base.finite
-
-
-def test_inside_an_obstacle_it_stands_and_says_so():
-    belief = belief_of([Disc(0.0, 0.0, 0.5)])
-    plan = planner_of(ReciprocalAvoidance).plan(belief, route_from(belief, 4.0, 0.0))
-    assert plan.base == BodyTwist()
-    assert plan.diagnostics.enclosed
-
-
-def test_without_a_route_it_stands():
-    plan = planner_of(ReciprocalAvoidance).plan(belief_of([]), Route(None, np.zeros((0, 2)), 0.0))
-    assert plan.base == BodyTwist()
 
 
 def test_drawn_edges_are_those_of_the_half_planes():

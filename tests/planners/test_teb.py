@@ -6,7 +6,6 @@ import pytest
 
 from drivers.interface.commands import BodyTwist
 from drivers.interface.errors import ConfigurationError
-from planners.router import Route
 from planners.standing import Discs, standing_world
 from planners.teb.band import Band, laid_along, taken_over
 from planners.teb.cost_kernels import evaluated, nearest_poses
@@ -15,10 +14,9 @@ from planners.teb.homotopy import detours, in_the_way, sides, standing_discs
 from planners.teb.optimiser_kernels import optimised, passing_times, resized, solve_banded, stepped
 from planners.teb.planner import ElasticBand
 from planners.teb.window import window_of
-from tests.planners.synthetic import OMNI, Box, Disc, belief_of, mission_to
-from tests.planners.tracked import JACKAL, Tracking, planner_of, run, straight_router, tracks_of
+from tests.planners.synthetic import OMNI, Box, Disc, belief_of
+from tests.planners.tracked import JACKAL, WALLS, Tracking, planner_of, route_from, run, tracks_of
 
-WALLS = [Box(-1, -1.5, 9, -1.4), Box(-1, 1.4, 9, 1.5)]
 NONE = Discs.of(())
 BOUNDS = Bounds(0.8, 0.2, 2.0, 1.0, 2.5, 0.10, 0.35, 0.5, 0.05)
 TIGHT = Bounds(0.2, 0.0, 0.3, 0.3, 0.4, 0.60, 0.90, 1.2, 0.05)  # every penalty is met
@@ -191,29 +189,6 @@ def test_small_things_that_stand_are_discs_and_walls_are_not():
     assert 0.25 <= discs.radius_m[0] < 0.38
 
 
-@pytest.mark.parametrize(
-    ("standing", "movers", "goal"),
-    [
-        ([], [], (3.0, 0.0)),
-        ([], [], (-2.0, 0.5)),
-        ([Disc(1.7, 0.05, 0.3)], [], (3.5, 0.0)),
-        ([Box(1.5, -3, 1.7, -0.6), Box(1.5, 0.6, 1.7, 3)], [], (3.0, 0.0)),
-        (WALLS, [Disc(5.0, 0.1, 0.25, -0.6)], (5.0, 0.0)),
-        ([], [Disc(2.5, -2.2, 0.25, 0.0, 0.8)], (4.5, 0.0)),
-    ],
-    ids=["open", "behind", "pillar", "gap", "head-on", "crossing"],
-)
-def test_it_arrives_without_touching(standing, movers, goal):
-    trace = run(planner_of(ElasticBand), standing, movers, goal)
-    assert trace.reached(*goal)
-    assert trace.min_clearance_m > 0.05
-    assert max(twist.speed_m_s for twist in trace.twists) == pytest.approx(0.8, abs=0.06)
-
-
-def route_from(belief, *goal):
-    return straight_router().route(belief, mission_to(*goal))
-
-
 def test_both_ways_round_are_tried_and_the_shorter_is_taken():
     for y in (0.12, -0.12):
         belief = belief_of([Disc(1.5, y, 0.3)])
@@ -237,18 +212,6 @@ def test_a_band_into_an_obstacle_is_not_driven():
     belief = belief_of([Box(0.45, -2.5, 3.0, 2.5)], twist=BodyTwist(0.3, 0.0, 0.0))
     plan = planner_of(ElasticBand).plan(belief, route_from(belief, 2.0, 0.0))
     assert not plan.diagnostics.feasible
-    assert plan.base == BodyTwist()
-
-
-def test_inside_an_obstacle_it_stands_and_says_so():
-    belief = belief_of([Disc(0.0, 0.0, 0.5)])
-    plan = planner_of(ElasticBand).plan(belief, route_from(belief, 4.0, 0.0))
-    assert plan.base == BodyTwist()
-    assert plan.diagnostics.enclosed
-
-
-def test_without_a_route_it_stands():
-    plan = planner_of(ElasticBand).plan(belief_of([]), Route(None, np.zeros((0, 2)), 0.0))
     assert plan.base == BodyTwist()
 
 

@@ -13,12 +13,13 @@ from planners.routers.grid import GridRouter
 from planners.routers.straight import StraightRouter
 from planners.shield import ShieldSetup
 from planners.shields.none import NoShield
-from tests.planners.synthetic import Disc, Trace, drive
+from tests.planners.synthetic import Box, Disc, Trace, drive, mission_to
 
 PERIOD_S, RADIUS_M = 0.05, 0.333
 JACKAL = BaseLimits(
     BodyTwist(1.0, 0.0, 2.0), BodyTwist(1.5, 0.0, 4.0), BodyTwist(20.0, 0.0, 40.0), BodyTwist(2.0, 0.0, 5.0), reverse=True
 )
+WALLS = [Box(-1, -1.5, 9, -1.4), Box(-1, 1.4, 9, 1.5)]
 
 
 def tracks_of(discs: list[Disc]) -> tuple[Track, ...]:
@@ -53,3 +54,7 @@ def run(planner: Any, standing: list[Any], movers: list[Disc], goal: tuple[float
     options = {"limits": JACKAL, "radius_m": RADIUS_M, "period_s": PERIOD_S, **options}
     shield = NoShield(NoShield.Settings(), ShieldSetup(PERIOD_S, RADIUS_M, options["limits"]))
     return drive(Tracking(planner, movers), router, shield, [*standing, *movers], goal, **options)
+
+
+def route_from(belief, *goal):
+    return straight_router().route(belief, mission_to(*goal))
