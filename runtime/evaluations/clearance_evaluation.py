@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import asdict, dataclass, replace
 
 from pydantic import Field, model_validator
@@ -14,7 +14,7 @@ from runtime import yaml_files
 from runtime.evaluations.clearance_figures import ClearanceFigures, FigureCollector
 from runtime.evaluations.clearance_table import COLUMNS, table
 from runtime.evaluations.evaluation import Evaluation, EvaluationTable
-from runtime.evaluations.side_by_side import side_by_side
+from runtime.evaluations.side_by_side import Workers, side_by_side
 from runtime.referee import Outcome
 
 
@@ -87,9 +87,9 @@ class ClearanceEvaluation(Evaluation):
         """Read the file's keys; raises pydantic's ValidationError."""
         return cls(ClearanceExperiment.model_validate(content), seeds, changes)
 
-    def run(self, jobs: int, done: Callable[[], None]) -> EvaluationTable:
+    def run(self, workers: Workers) -> EvaluationTable:
         """Run them all and make the tables, the first with those that follow it."""
-        found = side_by_side(self._todo, run_case, jobs, lambda case, figures: done())
+        found = side_by_side(self._todo, run_case, workers)
         made = [self._table(one, found) for one in self._tables]
         single = [asdict(case) | asdict(figures) for case, figures in found.items()]
         return replace(made[0], json=json.dumps(single, indent=1), further=tuple(made[1:]))

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from pydantic import ValidationError
 
 from drivers.interface.errors import ConfigurationError, unknown_name
 from runtime import yaml_files
+from runtime.evaluations.side_by_side import Workers
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +43,8 @@ class Evaluation(ABC):
         """Read the file's keys (`kind` taken out), with changes for every run; raises pydantic's ValidationError."""
 
     @abstractmethod
-    def run(self, jobs: int, done: Callable[[], None]) -> EvaluationTable:
-        """Do everything, `jobs` at a time."""
+    def run(self, workers: Workers) -> EvaluationTable:
+        """Do everything."""
 
 
 def load_evaluation(name_or_path: str, seeds: int | None, changes: tuple[str, ...], only: tuple[str, ...] = ()) -> Evaluation:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,7 +10,7 @@ from pydantic import Field
 from drivers.interface.settings import Settings
 from runtime import yaml_files
 from runtime.evaluations.evaluation import Evaluation, EvaluationTable
-from runtime.evaluations.side_by_side import side_by_side
+from runtime.evaluations.side_by_side import Workers, side_by_side
 from runtime.referee import Outcome
 from runtime.report import RunReport
 
@@ -78,10 +77,10 @@ class RunsEvaluation(Evaluation):
         """Read the file's keys; raises pydantic's ValidationError."""
         return cls(Experiment.model_validate(content), seeds, changes)
 
-    def run(self, jobs: int, done: Callable[[], None]) -> EvaluationTable:
+    def run(self, workers: Workers) -> EvaluationTable:
         """Run them all."""
         from runtime.evaluations import experiment_table  # noqa: PLC0415 - it knows this module
 
-        reports = side_by_side(self._todo, run_case, jobs, lambda case, report: done())
+        reports = side_by_side(self._todo, run_case, workers)
         rows = experiment_table.rows(self._experiment, reports)
         return EvaluationTable(experiment_table.HEAD, tuple(row.cells() for row in rows), experiment_table.as_json(reports))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from dataclasses import asdict
 
 from drivers.interface.errors import ConfigurationError
@@ -13,7 +12,7 @@ from runtime.evaluations import navigation_experiment
 from runtime.evaluations.episode import Episode
 from runtime.evaluations.evaluation import Evaluation, EvaluationTable
 from runtime.evaluations.navigation_experiment import NavigationCase, NavigationExperiment
-from runtime.evaluations.side_by_side import side_by_side
+from runtime.evaluations.side_by_side import Workers, side_by_side
 
 
 class NavigationEvaluation(Evaluation):
@@ -34,11 +33,11 @@ class NavigationEvaluation(Evaluation):
         """
         return cls(*navigation_experiment.read(content, seeds, changes))
 
-    def run(self, jobs: int, done: Callable[[], None]) -> EvaluationTable:
+    def run(self, workers: Workers) -> EvaluationTable:
         """Run them all."""
         from runtime.evaluations import navigation_table  # noqa: PLC0415 - SciPy's statistics are not needed to read an experiment
 
-        episodes = side_by_side(self._todo, drive, jobs, lambda case, episode: done())
+        episodes = side_by_side(self._todo, drive, workers)
         first, *further = navigation_table.tables(self._experiment, episodes)
         return EvaluationTable(first.head, first.rows, _as_json(episodes, (first, *further)), first.title, tuple(further))
 

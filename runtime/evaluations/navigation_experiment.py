@@ -34,6 +34,7 @@ class Environment(Settings):
 class TableSettings(Settings):
     """A table: the runs of some methods in some environments, taken together, beside what was published."""
 
+    name: str = Field(min_length=1, description="what `only` calls it")
     title: str
     environments: tuple[str, ...] = Field(min_length=1)
     methods: tuple[str, ...] = Field(min_length=1)
@@ -44,6 +45,7 @@ class TableSettings(Settings):
 class PairedSettings(Settings):
     """A paired comparison: what one method gains on another over the same worlds and seeds."""
 
+    name: str = Field(min_length=1, description="what `only` calls it")
     title: str
     environments: tuple[str, ...] = Field(min_length=1)
     method: str
@@ -66,20 +68,32 @@ class NavigationExperiment(Settings):
     methods: dict[str, tuple[str, ...]] = Field(min_length=1, description="overrides a.b=c by the method's name")
     tables: tuple[TableSettings, ...] = Field(min_length=1)
     paired: tuple[PairedSettings, ...] = ()
+    only: tuple[str, ...] = Field(default=(), description="tables and paired comparisons that are made; none: all")
 
     @model_validator(mode="after")
     def _names_exist(self) -> NavigationExperiment:
         _require("file", {e.file for e in self.environments.values() if e.file is not None}, self.files)
         _require("environment", {name for _, environments in self.compared for name in environments}, self.environments)
         _require("method", {name for methods, _ in self.compared for name in methods}, self.methods)
+        _require("table", set(self.only), [*(one.name for one in self.tables), *(one.name for one in self.paired)])
         return self
+
+    @property
+    def wanted_tables(self) -> tuple[TableSettings, ...]:
+        """The tables that are made."""
+        return tuple(table for table in self.tables if not self.only or table.name in self.only)
+
+    @property
+    def wanted_pairs(self) -> tuple[PairedSettings, ...]:
+        """The paired comparisons that are made."""
+        return tuple(pair for pair in self.paired if not self.only or pair.name in self.only)
 
     @property
     def compared(self) -> tuple[tuple[tuple[str, ...], tuple[str, ...]], ...]:
         """Which methods drive in which environments, by table and then by paired comparison."""
         return (
-            *((table.methods, table.environments) for table in self.tables),
-            *(((pair.method, pair.against), pair.environments) for pair in self.paired),
+            *((table.methods, table.environments) for table in self.wanted_tables),
+            *(((pair.method, pair.against), pair.environments) for pair in self.wanted_pairs),
         )
 
 

@@ -62,8 +62,8 @@ _GAINS: dict[Metric, tuple[str, Callable[[Episode, Episode, NavigationExperiment
 def tables(experiment: NavigationExperiment, episodes: Episodes) -> tuple[EvaluationTable, ...]:
     """Return every table and paired comparison; one whose worlds were not given has no rows."""
     return (
-        *(_table(experiment, table, episodes) for table in experiment.tables),
-        *(_paired(experiment, paired, episodes) for paired in experiment.paired),
+        *(_table(experiment, table, episodes) for table in experiment.wanted_tables),
+        *(_paired(experiment, paired, episodes) for paired in experiment.wanted_pairs),
     )
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import median
@@ -18,7 +17,7 @@ from drivers.interface.settings import Settings
 from runtime import yaml_files
 from runtime.evaluations.evaluation import Evaluation, EvaluationTable
 from runtime.evaluations.recorded_odometry import RecordedScore, score_recording
-from runtime.evaluations.side_by_side import side_by_side
+from runtime.evaluations.side_by_side import Workers, side_by_side
 
 HEAD = ("drive", "odometry", "figure", "before", "after", "ratio")
 KINDS = ("dead_reckoning", "ekf")
@@ -84,9 +83,9 @@ class OdometryEvaluation(Evaluation):
         """Read the file's keys; raises pydantic's ValidationError."""
         return cls(OdometryExperiment.model_validate(content), seeds, changes)
 
-    def run(self, jobs: int, done: Callable[[], None]) -> EvaluationTable:
+    def run(self, workers: Workers) -> EvaluationTable:
         """Drive all squares, then score the recording."""
-        drifts = side_by_side(self._todo, drive_square, jobs, lambda case, drift: done())
+        drifts = side_by_side(self._todo, drive_square, workers)
         recording = self._settings.recording
         scores = () if recording is None else score_recording(recording.wheels, recording.truth)
         way = f"square, {4.0 * self._settings.side_m:g} m"

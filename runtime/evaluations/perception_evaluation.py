@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from itertools import product
 from pathlib import Path
@@ -18,7 +18,7 @@ from runtime import yaml_files
 from runtime.evaluations.evaluation import Evaluation, EvaluationTable
 from runtime.evaluations.frame_phantoms import Phantoms, phantoms, read_frames
 from runtime.evaluations.perception import Perceived, perception
-from runtime.evaluations.side_by_side import side_by_side
+from runtime.evaluations.side_by_side import Workers, side_by_side
 
 HEAD = (
     "scene",
@@ -125,9 +125,9 @@ class PerceptionEvaluation(Evaluation):
                 runs.append(change)
         return cls(PerceptionExperiment.model_validate(content), seeds, tuple(runs))
 
-    def run(self, jobs: int, done: Callable[[], None]) -> EvaluationTable:
+    def run(self, workers: Workers) -> EvaluationTable:
         """Run them all, then play the frames."""
-        found = side_by_side(self._todo, look, jobs, lambda case, perceived: done())
+        found = side_by_side(self._todo, look, workers)
         played = self._played()
         groups: dict[tuple[str, str], list[Perceived]] = {}
         for case, perceived in found.items():

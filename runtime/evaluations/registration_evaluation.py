@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from statistics import median
 from typing import Any, Literal
@@ -17,7 +16,7 @@ from drivers.interface.settings import Settings
 from estimators.estimator import Estimator, EstimatorSetup
 from runtime import yaml_files
 from runtime.evaluations.evaluation import Evaluation, EvaluationTable
-from runtime.evaluations.side_by_side import side_by_side
+from runtime.evaluations.side_by_side import Workers, side_by_side
 
 Kind = Literal["dead_reckoning", "ekf"]
 KINDS: tuple[Kind, ...] = ("dead_reckoning", "ekf")
@@ -102,9 +101,9 @@ class RegistrationEvaluation(Evaluation):
         """Read the file's keys; raises pydantic's ValidationError."""
         return cls(RegistrationExperiment.model_validate(content), seeds, changes)
 
-    def run(self, jobs: int, done: Callable[[], None]) -> EvaluationTable:
+    def run(self, workers: Workers) -> EvaluationTable:
         """Drive them all."""
-        found = side_by_side(self._todo, drive_and_estimate, jobs, lambda case, driven: done())
+        found = side_by_side(self._todo, drive_and_estimate, workers)
         single = [{"seed": case.seed} | asdict(driven) for case, driven in found.items()]
         return EvaluationTable(
             HEAD, tuple(_rows(self._settings.configuration, list(found.values()))), json.dumps(single, indent=1)

@@ -5,22 +5,45 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Hashable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
 from multiprocessing import get_context
 from typing import TypeVar
+
+from runtime.evaluations.journal import Journal
 
 C = TypeVar("C", bound=Hashable)
 R = TypeVar("R")
 
 
-def side_by_side(todo: tuple[C, ...], work: Callable[[C], R], jobs: int, done: Callable[[C, R], None]) -> dict[C, R]:
-    """Do `work`, a function of a module, for all cases, `jobs` at a time; `done` hears of each as it ends.
+def _nothing() -> None:
+    pass
+
+
+@dataclass(frozen=True, slots=True)
+class Workers:
+    """Who does the work: how many at a time, who hears of each end, and where results are kept as they come."""
+
+    jobs: int = 1
+    done: Callable[[], None] = _nothing
+    journal: Journal | None = None
+
+
+def side_by_side(todo: tuple[C, ...], work: Callable[[C], R], workers: Workers) -> dict[C, R]:
+    """Do `work`, a function of a module with an annotated result, for all cases that the journal does not know yet.
 
     The result is in the order of the cases and does not depend on which came first.
+
+    Raises:
+        ConfigurationError: a result of the journal is not one of `work`, or it cannot be written any more.
     """
-    results: dict[C, R] = {}
-    for case, result in _each(todo, work, jobs):
+    results = {} if workers.journal is None else workers.journal.known(todo, work)
+    for _ in results:
+        workers.done()
+    for case, result in _each(tuple(case for case in todo if case not in results), work, workers.jobs):
         results[case] = result
-        done(case, result)
+        if workers.journal is not None:
+            workers.journal.add(case, result)
+        workers.done()
     return {case: results[case] for case in todo}
 
 

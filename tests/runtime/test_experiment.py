@@ -11,7 +11,7 @@ from runtime.cli import run_command
 from runtime.evaluations import experiment_table
 from runtime.evaluations.evaluation import EvaluationTable, load_evaluation
 from runtime.evaluations.experiment import Case, Experiment, cases, run_case
-from runtime.evaluations.side_by_side import side_by_side
+from runtime.evaluations.side_by_side import Workers, side_by_side
 from runtime.report import RunReport
 from runtime.yaml_files import shipped
 
@@ -62,8 +62,8 @@ def test_the_cases_are_all_combinations_in_order() -> None:
 
 def test_side_by_side_gives_what_one_after_the_other_gives() -> None:
     todo = cases(EXPERIMENT, seeds=1, also=SHORT)
-    one = side_by_side(todo, run_case, 1, lambda case, report: None)
-    two = side_by_side(todo, run_case, 2, lambda case, report: None)
+    one = side_by_side(todo, run_case, Workers(1))
+    two = side_by_side(todo, run_case, Workers(2))
     assert list(one) == list(two) == list(todo)
     for case in todo:
         assert replace(one[case], stage_ms={}, realtime_factor=0.0) == replace(two[case], stage_ms={}, realtime_factor=0.0)

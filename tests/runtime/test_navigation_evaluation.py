@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from drivers.interface.commands import BodyTwist, Command
 from drivers.interface.errors import ConfigurationError
@@ -39,17 +40,18 @@ EXPERIMENT = {
     "environments": {"door": {"configuration": "door"}, "discs": {"configuration": "dynabarn", "file": "worlds", "seeds": 2}},
     "methods": {"a": ["planner.name=dwa"], "b": ["planner.name=idle"], "unused": []},
     "tables": [
-        {"title": "one", "environments": ["door"], "methods": ["a", "b"], "columns": ["success", "min_clearance"]},
+        {"name": "one", "title": "one", "environments": ["door"], "methods": ["a", "b"], "columns": ["success", "min_clearance"]},
         {
+            "name": "two",
             "title": "two",
             "environments": ["discs"],
             "methods": ["a", "b"],
             "columns": ["score"],
             "published": {"a": {"score": 0.5}},
         },
-        {"title": "three", "environments": ["door"], "methods": ["a"], "columns": ["score"]},
+        {"name": "three", "title": "three", "environments": ["door"], "methods": ["a"], "columns": ["score"]},
     ],
-    "paired": [{"title": "four", "environments": ["door", "discs"], "method": "a", "against": "b"}],
+    "paired": [{"name": "four", "title": "four", "environments": ["door", "discs"], "method": "a", "against": "b"}],
 }
 GOOD = Episode("reached", False, 20.0, 10.0, 0.2, 4.0, 0.9, 1.0, 2.0, 0.3)
 BAD = Episode("collided", True, 8.0, 4.0, -0.01, 6.0, 0.0, 1.0, 2.0, 6.0)
@@ -136,6 +138,15 @@ def test_every_run_is_made_once_and_worlds_without_a_file_are_left_out() -> None
     assert {c.configuration for c in todo if c.environment == "discs"} == {f"dynabarn:{DYNABARN}#{n}" for n in (0, 18)}
     _, todo = navigation_experiment.read(EXPERIMENT, 1, (f"files.worlds={DYNABARN}",))
     assert len(todo) == 2 + 2 * 2
+
+
+def test_only_makes_one_table_and_only_its_runs() -> None:
+    experiment, todo = navigation_experiment.read(EXPERIMENT | {"only": ["three"]}, None, ())
+    assert {(c.environment, c.method) for c in todo} == {("door", "a")}
+    (table,) = navigation_table.tables(experiment, dict.fromkeys(todo, GOOD))
+    assert table.title == "three"
+    with pytest.raises(ValidationError, match=r"no table 'five'\. Known: one, two, three, four"):
+        navigation_experiment.read(EXPERIMENT | {"only": ["five"]}, None, ())
 
 
 def test_tables_and_pairs_add_up() -> None:
