@@ -41,8 +41,12 @@ class CostGrid:
 
 
 def _blocks(field: NDArray[np.generic], top: int, left: int, rows: int, columns: int, factor: int) -> F64:
-    cut = field[top : top + rows * factor, left : left + columns * factor].astype(np.float64)
-    return np.asarray(cut.reshape(rows, factor, columns, factor).mean(axis=(1, 3)))
+    """Return the means of blocks of `factor` by `factor` cells, shape (rows, columns)."""
+    total = np.zeros((rows, columns))
+    for down in range(factor):
+        for right in range(factor):
+            total += field[top + down : top + rows * factor : factor, left + right : left + columns * factor : factor]
+    return total / factor**2
 
 
 def cost_grid(belief: Belief, settings: GridCosts, robot_radius_m: float) -> CostGrid:
