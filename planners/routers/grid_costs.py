@@ -46,7 +46,7 @@ def _blocks(field: NDArray[np.generic], top: int, left: int, rows: int, columns:
     for down in range(factor):
         for right in range(factor):
             total += field[top + down : top + rows * factor : factor, left + right : left + columns * factor : factor]
-    return total / factor**2
+    return np.asarray(total / factor**2, dtype=np.float64)
 
 
 def cost_grid(belief: Belief, settings: GridCosts, robot_radius_m: float) -> CostGrid:
