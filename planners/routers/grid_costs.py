@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,13 +41,13 @@ class CostGrid:
     cost: F64  # (rows, columns)
 
 
-def _blocks(field: NDArray[np.generic], top: int, left: int, rows: int, columns: int, factor: int) -> F64:
+def _blocks(field: NDArray[Any], top: int, left: int, rows: int, columns: int, factor: int) -> F64:
     """Return the means of blocks of `factor` by `factor` cells, shape (rows, columns)."""
     total = np.zeros((rows, columns))
     for down in range(factor):
         for right in range(factor):
             total += field[top + down : top + rows * factor : factor, left + right : left + columns * factor : factor]
-    return np.asarray(total / factor**2, dtype=np.float64)
+    return total / factor**2
 
 
 def cost_grid(belief: Belief, settings: GridCosts, robot_radius_m: float) -> CostGrid:
