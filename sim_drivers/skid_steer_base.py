@@ -14,9 +14,10 @@ from drivers.interface.devices import DeviceSetup
 from drivers.interface.kinematics import SkidSteer
 from drivers.interface.settings import Settings
 from sim_drivers.mechanics import add_velocity_servo, set_inertia
+from sim_drivers.tyres import Tyres
 from sim_drivers.wheel_encoders import EncoderSettings
 from sim_drivers.wheeled_base import WheeledBase, WheeledBaseSettings
-from sim_drivers.world import FLOOR_BIT, OBSTACLE_BIT, MujocoWorld
+from sim_drivers.world import FLOOR_BIT, OBSTACLE_BIT, MujocoWorld, require_world
 
 Fraction = Annotated[float, Field(ge=-0.2, le=0.2)]
 
@@ -31,7 +32,6 @@ GROUND_CLEARANCE_M = 0.065
 ROTOR_INERTIA_KG_M2 = 0.1  # of the motor, seen through its gear
 SERVO_GAIN_NM_S = 40.0
 TYRE_TIME_S = 0.04  # contact time constant: the tyre gives by about a millimetre
-TYRE_IMPEDANCE_RATIO = 0.05  # how much stiffer the tyre holds sideways than upwards; little: it creeps before it slides
 
 
 class SkidSteerSettings(WheeledBaseSettings):
@@ -60,7 +60,7 @@ class SkidSteerSettings(WheeledBaseSettings):
 
 
 class SkidSteerChassis:
-    """A free body on four driven wheels.  Turning drags every tyre sideways: slip is all there is to it.
+    """A free body on four driven wheels.  Turning drags every tyre sideways: slip is all there is to it (`sim_drivers/tyres.py`).
 
     A wheel touches the floor in one point.  In a quasi-static turn the moments of the four friction forces balance when the
     effective track is track + wheelbase^2 / track = 0.558 m, whatever the friction, the load on a wheel and the rate; that is
@@ -73,13 +73,13 @@ class SkidSteerChassis:
     def __init__(self, settings: SkidSteerSettings) -> None:
         """Take the settings."""
         self._settings = settings
+        self.tyres = Tyres(WHEELS, settings.friction)  # a part of its own: they hold at every step, whoever drives the wheels
         self._qpos: list[int] = []
         self._ctrl = slice(0, 0)
 
     def build(self, spec: Any, base: Any) -> None:
         """Add the body, the wheels and their drives."""
         spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC  # a pyramid grips better along its edges than across
-        spec.option.impratio = TYRE_IMPEDANCE_RATIO
         base.add_freejoint()
         body_kg = self._settings.mass_kg - len(WHEELS) * WHEEL_MASS_KG
         set_inertia(base, body_kg, BODY_CENTRE_M, BODY_INERTIA_KG_M2)
@@ -121,9 +121,9 @@ class SkidSteerChassis:
             size=[radius_m, WHEEL_WIDTH_M / 2, radius_m],
             contype=0,
             conaffinity=FLOOR_BIT,
-            friction=[self._settings.friction, 0, 0],
+            condim=1,  # it carries; what holds it along the floor are the tyres
             solref=[TYRE_TIME_S, 1.0],
-            priority=1,  # its friction counts, not the larger one of the floor
+            priority=1,  # so that this counts, not what the floor is made of
             rgba=[0.1, 0.1, 0.1, 1.0],
         )
 
@@ -141,4 +141,6 @@ class SimSkidSteerBase(WheeledBase):
             ConfigurationError: there is no simulated world.
         """
         nominal = SkidSteer(settings.wheel_radius_m, settings.effective_track_m, len(WHEELS))
-        super().__init__(settings, setup, SkidSteerChassis(settings), nominal)
+        chassis = SkidSteerChassis(settings)
+        super().__init__(settings, setup, chassis, nominal)
+        require_world(setup).add(chassis.tyres)

@@ -107,6 +107,7 @@ class RoverAutopilot:
         self._zero_rad = np.zeros(len(WHEELS))
         self._power_up(0)
         setup.world.add(self)
+        setup.world.add(self._chassis.tyres)
 
     @property
     def listens(self) -> str:

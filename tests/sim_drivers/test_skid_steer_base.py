@@ -135,3 +135,32 @@ def test_the_seed_decides():
 
     assert run(1).tobytes() == run(1).tobytes()
     assert run(1).tobytes() != run(2).tobytes()
+
+
+@pytest.mark.parametrize("twist", [BodyTwist(0.0, 0.0, 2.0), BodyTwist(0.6, 0.0, -1.6)])
+def test_tyres_that_are_dragged_sideways_stay_on_the_floor(twist):
+    world, base = make(start=SE2(0.0, 0.0, 0.4))
+    hold(world, base, twist, 1.0)
+    loads, speeds = [], []
+    for _ in range(200):
+        base.command(twist, world.now_ns + 150 * MS)
+        world.step_to(world.now_ns + 3 * MS)
+        loads.append(world.data.sensordata.copy())
+        speeds.append(world.data.qvel[:3].copy())
+    assert np.min(loads) > 0.5 * 17.0 * 9.81 / 4  # each wheel carries; in a curve the outer ones more
+    assert np.sum(loads, axis=1) == pytest.approx(17.0 * 9.81, rel=0.02)  # the base does not bounce
+    force = np.diff(speeds, axis=0) / 2.5e-3 + (0.0, 0.0, 9.81)
+    assert np.linalg.norm(force, axis=1) == pytest.approx(9.81, abs=0.3)
+
+
+def test_sliding_sideways_is_braked_by_friction_alone():
+    """Coulomb: mu g, whatever the weight and the speed, well above the speed at which a tyre creeps."""
+    for mass_kg, friction in ((17.0, 0.6), (30.0, 0.4)):
+        world, base = make(mass_kg=mass_kg, friction=friction)
+        hold(world, base, BodyTwist(), 0.2)
+        world.data.qvel[1] = 2.0
+        world.step_to(world.now_ns + 50 * MS)
+        before = float(world.data.qvel[1])
+        world.step_to(world.now_ns + 100 * MS)
+        assert before - float(world.data.qvel[1]) == pytest.approx(0.1 * friction * 9.81, rel=0.03)
+        base.close()
