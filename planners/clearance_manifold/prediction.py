@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from drivers.interface.samples import frozen_array
 from estimators.belief import F32, F64, Belief, ClearanceField, Lattice
-from estimators.clearance import distance_to
 from estimators.memory.rolling import transfer
 from planners.clearance_manifold.closing import ClosingMemory
-from planners.clearance_manifold.prediction_kernels import Arrival, free_on_arrival, nearest_closing, observe
+from planners.clearance_manifold.distance_kernels import lowered
+from planners.clearance_manifold.prediction_kernels import Arrival, nearest_closing, observe, taken_on_arrival
 from planners.clearance_manifold.settings import PredictionSettings
 
 NEVER_S = 1e6  # age of what was never in view
@@ -48,7 +48,8 @@ class ArrivalField:
         field, known = frozen_array(np.ones((3, 3), np.float32)), frozen_array(np.ones((3, 3), np.bool_))
         age_s = np.zeros((3, 3), np.float32)
         observe(age_s, known, np.zeros(2), 1.0, np.zeros(3), 1.0, 1.0, 0.0)
-        free_on_arrival(field, field, age_s, np.zeros(2), 1.0, np.zeros(2), self._arrival(0.0))
+        taken = taken_on_arrival(field, field, age_s, np.zeros(2), 1.0, np.zeros(2), self._arrival(0.0))
+        lowered(field, taken, 1.0)
         nearest_closing(field, field, np.zeros(2), 1.0, np.zeros(2), CLOSING_M_S)
 
     def update(self, belief: Belief) -> Predicted:
@@ -58,12 +59,12 @@ class ArrivalField:
         corner = np.array([field.lattice.x_m, field.lattice.y_m])
         robot, arrival = np.array([pose.x, pose.y]), self._arrival(belief.twist.speed_m_s)
         cell_m = field.lattice.cell_m
-        free = free_on_arrival(field.clearance_m, field.rate_m_s, self._age_s, corner, cell_m, robot, arrival)
+        taken = taken_on_arrival(field.clearance_m, field.rate_m_s, self._age_s, corner, cell_m, robot, arrival)
         closing = nearest_closing(field.clearance_m, field.rate_m_s, corner, cell_m, robot, CLOSING_M_S)
         if closing[4] < LEAST_CELLS:
             closing[4] = 0.0
         closing = self._closing.update(closing, field, self._age_s, elapsed_s)
-        return Predicted(distance_to(free == 0, cell_m), closing, arrival.speed_m_s)
+        return Predicted(lowered(field.clearance_m, taken, cell_m), closing, arrival.speed_m_s)
 
     @property
     def age_s(self) -> F32:

@@ -1,4 +1,4 @@
-"""Layer 1 on arrays: how old each cell's observation is, and which cells will be occupied on arrival."""
+"""Layer 1 on arrays: how old each cell's observation is, and which cells will be taken on arrival."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ def observe(
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def free_on_arrival(clearance: F32, rate: F32, age_s: F32, corner: F64, cell_m: float, robot: F64, arrival: Arrival) -> U8:
-    """Return 0 where equation 2 leaves no clearance and 1 elsewhere, shape (rows, columns).
+def taken_on_arrival(clearance: F32, rate: F32, age_s: F32, corner: F64, cell_m: float, robot: F64, arrival: Arrival) -> U8:
+    """Return 1 where there is clearance now and equation 2 leaves none, 0 elsewhere, shape (rows, columns).
 
     Source: Cui, Deng, Wang, equation 2: clearance + h c c_pred rate, with h the time to get there, c the confidence in an
     observation of this age and c_pred the trust in a rate over h.
     """
-    free = np.empty(clearance.shape, np.uint8)
+    taken = np.zeros(clearance.shape, np.uint8)
     for row in range(clearance.shape[0]):
         y = corner[1] + (row + 0.5) * cell_m - robot[1]
         for column in range(clearance.shape[1]):
@@ -53,9 +53,8 @@ def free_on_arrival(clearance: F32, rate: F32, age_s: F32, corner: F64, cell_m: 
                 h = min(np.sqrt(x * x + y * y) / arrival.speed_m_s, arrival.horizon_max_s)
                 confidence = np.exp(-age_s[row, column] / arrival.confidence_decay_s)
                 trust = arrival.trust_decay_s / (arrival.trust_decay_s + h)
-                value = value + h * confidence * trust * change
-            free[row, column] = value > 0.0
-    return free
+                taken[row, column] = value + h * confidence * trust * change <= 0.0
+    return taken
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

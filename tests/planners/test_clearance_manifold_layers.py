@@ -6,8 +6,10 @@ from scipy.optimize import lsq_linear
 
 from drivers.interface.commands import BodyTwist
 from drivers.interface.geometry import SE2
+from estimators.clearance import distance_to
 from planners.clearance_manifold.chart import STEP_M, lay_chart
 from planners.clearance_manifold.control_kernels import brakable, known_length
+from planners.clearance_manifold.distance_kernels import lowered
 from planners.clearance_manifold.manifold import Stations
 from planners.clearance_manifold.offset_qp import OffsetProgram
 from planners.clearance_manifold.prediction import ArrivalField
@@ -108,6 +110,14 @@ def test_a_receding_wall_and_a_still_one_are_left_where_they_are():
         predicted = ArrivalField(PredictionSettings()).update(belief)
         near = belief.clearance.clearance_m < 2.0
         assert predicted.clearance_m[near] == pytest.approx(belief.clearance.clearance_m[near], abs=0.08)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.002, 0.1, 1.0])
+def test_what_will_be_taken_lowers_the_field_to_the_transform_of_both_to_the_bit(share):
+    rng = np.random.default_rng(11)
+    now, then = rng.random((40, 53)) < 0.02, rng.random((40, 53)) < share
+    both = lowered(distance_to(now, 0.05), (then & ~now).astype(np.uint8), 0.05)
+    assert np.array_equal(both, distance_to(now | then, 0.05))
 
 
 def test_what_is_out_of_view_is_trusted_less_with_age():
