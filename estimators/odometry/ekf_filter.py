@@ -10,6 +10,7 @@ from drivers.interface.geometry import wrap_angle
 from drivers.interface.kinematics import WheelKinematics
 from drivers.interface.samples import ImuSample, PoseSample, WheelSample
 from estimators.odometry.ekf_algebra import Algebra, squared_surprise
+from estimators.odometry.ekf_inertial import InertialModel, Reading
 from estimators.odometry.ekf_model import BIASES, GYRO_BIAS, POSE, STATES, VELOCITY, VX, WAY, YAW, transition, without_way
 from estimators.odometry.ekf_settings import EkfSettings
 from estimators.odometry.ekf_state import EkfState
@@ -20,7 +21,6 @@ from estimators.odometry.wheel_way import WheelModel, WheelWay, farthest
 Sample = ImuSample | WheelSample | PoseSample
 VELOCITY_STD_M_S = 0.5  # of a velocity of which nothing is known
 LOST_STD = (0.5, 0.5, 0.5)  # m, m, rad: what the pose loses while nothing is sensed for too long
-SPIN_OVER_S = 1e-3  # stamps that a busy host has pressed closer together than this tell no rate of change
 IMPOSSIBLE = 2.0  # times the fastest: a velocity that no shock explains either
 
 
@@ -31,6 +31,7 @@ class MotionFilter:
         """Without kinematics wheel samples are of no use."""
         self._settings, self._limits = settings, limits
         self._wheels = None if kinematics is None else WheelModel(settings, kinematics)
+        self._inertial = InertialModel(settings, limits)
         self._algebra = Algebra(settings.innovation_gate, settings.skip_ratio)
         s = settings
         self._walk_std = np.array((s.gyro_walk_rad_s2_sqrt_hz, s.accel_walk_m_s3_sqrt_hz, s.accel_walk_m_s3_sqrt_hz))
@@ -54,57 +55,42 @@ class MotionFilter:
             self._wheels.warm_up()
         transition(np.zeros(STATES), (0.0, 0.0, 0.0, True, 1.0, 1.0), self._walk_std, 0.01)
 
-    def fold(self, state: EkfState, sample: Sample) -> EkfState:
-        """Return the state after a sample that was captured no earlier than the state."""
+    def fold(self, state: EkfState, sample: Sample, ahead: ImuSample | None = None) -> EkfState:
+        """Return the state after a sample that was captured no earlier than the state; `ahead` is the inertial one after it."""
         match sample:
             case ImuSample():
                 after = self._fold_inertial(state, sample)
             case WheelSample():
-                after = self._fold_wheels(state, sample)
+                after = self._fold_wheels(state, sample, self._next(state, ahead))
             case PoseSample():
-                after = self._fold_pose(state, sample)
+                after = self._fold_pose(state, sample, self._next(state, ahead))
         return self._checked(state, after, sample.stamp.captured_ns)
 
     def _fold_inertial(self, state: EkfState, sample: ImuSample) -> EkfState:
-        s, (fx, fy, fz), captured_ns = self._settings, sample.accel_m_s2, sample.stamp.captured_ns
-        rate = sample.gyro_rad_s[2] * self._limits.gyro_scale
-        force = math.sqrt(fx * fx + fy * fy + fz * fz)
-        if not abs(rate) <= self._limits.turn_rate_max_rad_s or not s.accel_min_m_s2 <= force <= s.accel_max_m_s2:
+        reading = self._inertial.reading(state, sample)
+        if reading is None:
             return state._replace(dropped=state.dropped + 1)
-        recent = self._gyro_is_recent(state, captured_ns)
-        fx, fy = self._at_base(state, fx, fy, rate, captured_ns) if recent else (fx, fy)
-        mean_rate = 0.5 * (state.rate_rad_s + rate) if recent else rate
-        old = state.force_m_s2 if recent and state.force_m_s2 is not None else (fx, fy)
-        mean_force = 0.5 * (old[0] + fx), 0.5 * (old[1] + fy)
-        moved = self._to(state, captured_ns, mean_rate, mean_force, known=recent)
-        return moved._replace(rate_rad_s=rate, force_m_s2=(fx, fy), gyro_ns=captured_ns)
+        return self._inertial.taken(self._to(state, reading.captured_ns, reading), reading)
 
-    def _at_base(self, state: EkfState, fx: float, fy: float, rate: float, time_ns: int) -> tuple[float, float]:
-        """Return the specific force at the base's origin: where the unit sits, turning pulls outwards and speeding up sideways.
+    def _next(self, state: EkfState, ahead: ImuSample | None) -> Reading | None:
+        """Return the next reading where it is near enough to say something of the time before it."""
+        near = ahead is not None and self._inertial.recent(state, ahead.stamp.captured_ns)
+        return self._inertial.reading(state, ahead) if near and ahead is not None else None
 
-        Source: the acceleration of a point of a rigid body, a + dw/dt x r + w x (w x r) (Siciliano et al., Robotics, appendix).
-        """
-        x_m, y_m = self._limits.imu_x_m, self._limits.imu_y_m
-        if (x_m == 0.0 and y_m == 0.0) or state.gyro_ns is None or time_ns <= state.gyro_ns:
-            return fx, fy
-        spin = (rate - state.rate_rad_s) / max((time_ns - state.gyro_ns) / SECOND_NS, SPIN_OVER_S)
-        turning = 0.5 * (rate + state.rate_rad_s) - float(state.x[GYRO_BIAS])
-        return fx + turning * turning * x_m + spin * y_m, fy + turning * turning * y_m - spin * x_m
-
-    def _fold_wheels(self, state: EkfState, sample: WheelSample) -> EkfState:
+    def _fold_wheels(self, state: EkfState, sample: WheelSample, ahead: Reading | None) -> EkfState:
         model, captured_ns = self._wheels, sample.stamp.captured_ns
         if model is None or not model.usable(sample):
             return state._replace(dropped=state.dropped + 1)
         if state.wheels_ns is None or state.wheels_rad is None:
-            return self._anchored(self._held(state, captured_ns), sample)
+            return self._anchored(self._to(state, captured_ns, ahead), sample)
         elapsed_s = (captured_ns - state.wheels_ns) / SECOND_NS
         way = model.way(state.wheels_rad, sample, elapsed_s)
         if not self._plausible(way, elapsed_s):  # a counter jumped, wrapped or was reset
-            after = self._anchored(self._held(state, captured_ns), sample)
+            after = self._anchored(self._to(state, captured_ns, ahead), sample)
             return after._replace(dropped=state.dropped + 1)
-        if state.time_ns == state.wheels_ns and not self._gyro_is_recent(state, captured_ns):
+        if state.time_ns == state.wheels_ns and not self._inertial.recent(state, captured_ns):
             return self._anchored(self._reckoned(state, way, captured_ns), sample)
-        after = self._held(state, captured_ns)
+        after = self._to(state, captured_ns, ahead)
         if after.wheels_ns is not None:
             if self._stands(state, sample):
                 way = model.standstill()
@@ -113,15 +99,15 @@ class MotionFilter:
             after = self._at_speed(after, way) if lost or self._is_too_fast(after) else after
         return self._anchored(after, sample)
 
-    def _fold_pose(self, state: EkfState, sample: PoseSample) -> EkfState:
+    def _fold_pose(self, state: EkfState, sample: PoseSample, ahead: Reading | None) -> EkfState:
         """Fold in an absolute pose; the first one says where the device's own frame lies."""
         pose, covariance, s = sample.local_from_base, sample.covariance, self._settings
         finite = math.isfinite(pose.x + pose.y + pose.yaw) and covariance.shape == (3, 3) and np.isfinite(covariance).all()
         if not finite or (np.diag(covariance) < 0.0).any():
             return state._replace(dropped=state.dropped + 1)
-        if sample.twist is not None and sample.twist.finite and not self._gyro_is_recent(state, sample.stamp.captured_ns):
+        if sample.twist is not None and sample.twist.finite and not self._inertial.recent(state, sample.stamp.captured_ns):
             state = state._replace(rate_rad_s=sample.twist.wz + float(state.x[GYRO_BIAS]))
-        before = self._held(state, sample.stamp.captured_ns)
+        before = self._to(state, sample.stamp.captured_ns, ahead)
         if before.local_from_odom is None:
             return before._replace(local_from_odom=pose @ before.pose.inverse())
         measured, believed = before.local_from_odom.inverse() @ pose, before.pose
@@ -136,9 +122,6 @@ class MotionFilter:
         x, covariance = self._algebra.correct(before, innovation, POSE, noise / weight)
         return before._replace(x=x, covariance=covariance)
 
-    def _gyro_is_recent(self, state: EkfState, time_ns: int) -> bool:
-        return state.gyro_ns is not None and time_ns - state.gyro_ns <= self._settings.gap_max_s * SECOND_NS
-
     def _plausible(self, way: WheelWay, elapsed_s: float) -> bool:
         speed_max, rate_max = self._limits.speed_max_m_s, self._limits.turn_rate_max_rad_s
         (dx, dy, turned), (vx, vy, wz) = way.vector.tolist(), way.twist.tolist()
@@ -146,23 +129,15 @@ class MotionFilter:
         moves = math.hypot(dx, dy) <= speed_max * longest_s and abs(turned) <= rate_max * longest_s
         return moves and math.hypot(vx, vy) <= speed_max and abs(wz) <= rate_max
 
-    def _held(self, state: EkfState, time_ns: int) -> EkfState:
-        """Carry a state on with what the inertial unit said last."""
-        known = self._gyro_is_recent(state, time_ns)
-        return self._to(state, time_ns, state.rate_rad_s, state.force_m_s2 if known else None, known=known)
-
-    def _to(self, state: EkfState, time_ns: int, rate: float, force: tuple[float, float] | None, *, known: bool) -> EkfState:
-        s = self._settings
+    def _to(self, state: EkfState, time_ns: int, ahead: Reading | None) -> EkfState:
+        """Carry a state on, by what the inertial unit says before and after; where it said nothing after, its last holds."""
         if state.time_ns is None or time_ns == state.time_ns:
             return state._replace(time_ns=time_ns)
         dt_s = (time_ns - state.time_ns) / SECOND_NS
-        if dt_s > s.blind_max_s:
+        if dt_s > self._settings.blind_max_s:
             return self._lost(state, time_ns)
-        rate_std = s.gyro_noise_rad_s_sqrt_hz if known else s.blind_turn_rad_s_sqrt_hz
-        if known and force is not None:
-            drive = (rate, *force, True, rate_std, s.accel_noise_m_s2_sqrt_hz)
-        else:
-            drive = (rate, 0.0, 0.0, False, rate_std, s.blind_accel_m_s2_sqrt_hz)
+        inertial = self._inertial
+        drive = inertial.held(state, time_ns) if ahead is None else inertial.between(state, ahead, time_ns)
         x, covariance = self._algebra.propagate(state, *transition(state.x, drive, self._walk_std, dt_s))
         return state._replace(x=x, covariance=covariance, time_ns=time_ns)
 

@@ -21,7 +21,8 @@ def key_of(sample: Sample) -> Key:
 class History:
     """A sorted window of samples.  A late one is put in its place and all after it are folded again, from the state before it.
 
-    So the order of arrival leaves no trace: the states are those of the sorted samples, bit for bit.
+    So the order of arrival leaves no trace: the states are those of the sorted samples, bit for bit.  What lies between two
+    samples of the inertial unit is folded with both; what comes after the newest is folded again when the next one is there.
     """
 
     def __init__(self, motion: MotionFilter, span_ns: int) -> None:
@@ -52,7 +53,7 @@ class History:
                 continue
             self._keys.insert(place, key)
             self.samples.insert(place, sample)
-            first = min(first, place)
+            first = min(first, self._changed_by(place))
         self._replay(first)
         return first, refused
 
@@ -70,9 +71,23 @@ class History:
         self.base, self.samples, self._keys, self.states = base, samples, [key_of(sample) for sample in samples], []
         self._replay(0)
 
+    def _changed_by(self, place: int) -> int:
+        """Return the first place whose state a new sample changes: inertial ones tell of the time since the one before, too."""
+        if not isinstance(self.samples[place], ImuSample):
+            return place
+        last = place - 1
+        while last >= 0 and not isinstance(self.samples[last], ImuSample):
+            last -= 1
+        if last < 0:
+            return 0
+        return min(place, bisect_right(self._keys, (self._keys[last][0], 2)))  # what was captured together with it stays
+
     def _replay(self, first: int) -> None:
         del self.states[first:]
-        state = self.newest
-        for sample in self.samples[first:]:
-            state = self._motion.fold(state, sample)
+        state, todo = self.newest, self.samples[first:]
+        ahead: list[ImuSample | None] = []
+        for sample in reversed(todo):
+            ahead.append(sample if isinstance(sample, ImuSample) else ahead[-1] if ahead else None)
+        for sample, inertial in zip(todo, reversed(ahead), strict=True):
+            state = self._motion.fold(state, sample, inertial)
             self.states.append(state)

@@ -20,13 +20,21 @@ class EkfSettings(Settings):
     gyro_bias_std_rad_s: float = Field(default=0.0175, gt=0.0, le=1.0, description="of the bias at the start; BMI055: 1 deg/s")
     gyro_bias_max_rad_s: float = Field(default=0.2, gt=0.0, le=5.0, description="a larger one means wrong units: diverged")
     accel_noise_m_s2_sqrt_hz: float = Field(default=0.03, gt=0.0, le=10.0, description="white noise, lever arm and vibration")
+    jerk_max_m_s3: float = Field(
+        default=15.0, ge=0.0, le=1e3, description="how fast specific force changes, at most, between samples that do not show it"
+    )
+    turn_jerk_max_rad_s3: float = Field(
+        default=60.0, ge=0.0, le=1e4, description="the same for the turn: how fast its acceleration changes"
+    )
     accel_walk_m_s3_sqrt_hz: float = Field(default=2e-3, gt=0.0, le=1.0, description="random walk of its bias, tilt included")
     accel_bias_std_m_s2: float = Field(default=0.3, gt=0.0, le=10.0, description="of the bias at the start, tilt included")
     accel_min_m_s2: float = Field(default=3.0, ge=0.0, le=9.0, description="less specific force is no gravity: wrong units")
     accel_max_m_s2: float = Field(default=80.0, gt=10.0, le=400.0, description="more is no drive on wheels: wrong units")
     blind_accel_m_s2_sqrt_hz: float = Field(default=0.7, gt=0.0, le=10.0, description="how motion changes that nobody measures")
     blind_turn_rad_s_sqrt_hz: float = Field(default=0.3, gt=0.0, le=10.0, description="the same for the yaw rate, without a gyro")
-    gap_max_s: float = Field(default=0.05, gt=0.0, le=1.0, description="a gyro that is silent for longer is not interpolated")
+    gap_max_s: float = Field(
+        default=0.05, gt=0.0, le=1.0, description="a unit that is silent for longer is not interpolated; more for one below 25 Hz"
+    )
     blind_max_s: float = Field(default=0.5, gt=0.0, le=10.0, description="after so long without a sample the motion is unknown")
     encoder_noise_rad: float = Field(default=1e-3, gt=0.0, le=0.1, description="of a wheel's turn between two samples")
     stamp_std_s: float = Field(

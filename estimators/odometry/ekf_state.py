@@ -23,6 +23,7 @@ class EkfState(NamedTuple):
     rate_rad_s: float = 0.0  # the newest yaw rate, bias not taken off
     force_m_s2: tuple[float, float] | None = None  # the newest specific force; None: it was not usable
     gyro_ns: int | None = None  # when the newest gyro sample was captured
+    slopes: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of rate and specific force between the two newest [rad/s^2, m/s^3]
     wheels_ns: int | None = None  # when the wheel sample was captured that the way is counted from
     wheels_rad: F64 | None = None  # (wheels,), its angles
     still_ns: int | None = None  # since when the wheels have not turned further than their counting jitters
@@ -53,6 +54,7 @@ class EkfState(NamedTuple):
             times_ns=np.array([_NEVER if time is None else time for time in times], dtype=np.int64),
             rate_rad_s=self.rate_rad_s,
             force_m_s2=self.force_m_s2 or (),
+            slopes=self.slopes,
             wheels_rad=np.zeros(0) if self.wheels_rad is None else self.wheels_rad,
             still_rad=np.zeros(0) if self.still_rad is None else self.still_rad,
             local_from_odom=() if local is None else (local.x, local.y, local.yaw),
@@ -66,6 +68,7 @@ class EkfState(NamedTuple):
         time_ns, gyro_ns, wheels_ns, still_ns, rejected_ns = (None if t == _NEVER else t for t in state["times_ns"].tolist())
         force, local = state["force_m_s2"].tolist(), state["local_from_odom"].tolist()
         slipping, dropped, diverged = state["counts"].tolist()
+        slopes = state["slopes"].tolist()
         return cls(
             x=state["x"].reshape(STATES),
             covariance=state["covariance"],
@@ -73,6 +76,7 @@ class EkfState(NamedTuple):
             rate_rad_s=float(state["rate_rad_s"]),
             force_m_s2=(force[0], force[1]) if force else None,
             gyro_ns=gyro_ns,
+            slopes=(slopes[0], slopes[1], slopes[2]),
             wheels_ns=wheels_ns,
             wheels_rad=state["wheels_rad"] if wheels_ns is not None else None,
             still_ns=still_ns,
