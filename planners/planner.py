@@ -29,6 +29,7 @@ class PlannerSetup:
     limits: BaseLimits | None  # None: a robot without a base
     seed: int
     arm_limits: JointLimits | None = None  # None: a robot without an arm
+    kept_clear_m: float = 0.0  # what the shield keeps between the robot's centre and what stands; narrower ways are closed
 
 
 @dataclass(frozen=True, slots=True)

@@ -54,6 +54,14 @@ class Shield(Stateful, Protocol):
 
     Settings: ClassVar[type[Settings]]
 
+    @property
+    def kept_clear_m(self) -> float:
+        """What it keeps between the robot's centre and what stands still [m]; 0: it knows of no obstacle.
+
+        A planner is told, so that it plans through no passage that the shield holds the robot before.
+        """
+        ...
+
     def warm_up(self) -> None:
         """Compile every kernel; called once before the first tick."""
         ...

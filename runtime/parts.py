@@ -78,8 +78,9 @@ def build_parts(
 
     planning = configuration.planner
     plan_period_s = period_s * planning.common.period_ticks
-    planner = planning.choice.build(PlannerSetup(plan_period_s, radius_m, limits, seed, arm_limits))
     shield = configuration.shield.build(ShieldSetup(period_s, radius_m, limits))
+    told = PlannerSetup(plan_period_s, radius_m, limits, seed, arm_limits, shield.kept_clear_m)
+    planner = planning.choice.build(told)
     budget_ns = configuration.loop.period_ns if planning.common.budget_ms is None else round(planning.common.budget_ms * 1e6)
     if latency := planning.common.latency_ticks:
         budget = fixed(latency * configuration.loop.period_ns)

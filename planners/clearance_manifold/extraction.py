@@ -14,6 +14,7 @@ from planners.clearance_manifold.ridge_kernels import (
     Ground,
     Sections,
     along_manifold,
+    ample_boxes,
     boxes,
     cheapest_branch,
     cost_along,
@@ -23,6 +24,7 @@ from planners.clearance_manifold.ridge_kernels import (
     station_costs,
 )
 from planners.clearance_manifold.settings import SolverSettings, TrackerSettings
+from planners.planner import PlannerSetup
 
 CURVATURE_LENGTH_M = 0.5  # at which curvature costs as much as slope
 CENTRING = 0.05
@@ -57,14 +59,15 @@ class Prior:
 class Solver:
     """The two-stage solver of section 4.2 and the repairing one of section 4.4."""
 
-    def __init__(
-        self, settings: SolverSettings, tracker: TrackerSettings, stations: Stations, radius_m: float, period_s: float
-    ) -> None:
+    def __init__(self, settings: SolverSettings, tracker: TrackerSettings, stations: Stations, setup: PlannerSetup) -> None:
         """Set both programs up."""
-        s = settings
+        s, period_s = settings, setup.period_s
         self._settings, self._tracker, self._stations = settings, tracker, stations
-        self.least_m = radius_m + s.margin_m
-        self._demand = Demand(self.least_m, max(s.ridge_enough_m, self.least_m), CENTRING)
+        self.least_m = setup.robot_radius_m + s.margin_m
+        kept_m = max(self.least_m, setup.kept_clear_m)
+        ample_m = kept_m + s.ample_m
+        self._demand = Demand(self.least_m, kept_m, ample_m, max(s.ridge_enough_m, ample_m), CENTRING)
+        self._step_towards_m = tracker.lipschitz_m_s * period_s
         self._offsets = np.linspace(-s.half_width_m, s.half_width_m, s.cross_samples)
         self._spacing = np.diff(stations.arcs_m[stations.own :])
         self._step_m = 2.0 * s.half_width_m / (s.cross_samples - 1)
@@ -103,8 +106,8 @@ class Solver:
         inside = np.concatenate((np.full(own, ahead[0] if prior is None else np.nan), ahead))
         if prior is not None:
             inside[:own] = prior.offset_m[:own]
-        found = boxes(scene.ground, scene.sections, inside, self._step_m, self._demand)
-        return self._solve(scene, self._free, found, inside, (inside,), inside, np.zeros(len(inside)))[0]
+        found = self._boxes(scene, inside, None)
+        return self._solve(scene, self._free, found, (inside,), inside, np.zeros(len(inside)))[0]
 
     def repair(self, scene: Scene, prior: Prior, tubes_m: F64) -> tuple[Manifold, F64, int, bool]:
         """Return the repaired manifold, its multipliers, how many stations from the own on could be repaired, and convergence."""
@@ -118,17 +121,30 @@ class Solver:
             liked = np.where(np.arange(n) < own + repaired, prior.offset_m, np.nan)
             regrown, _ = self.branch(scene, liked)
             inside[own + repaired :] = regrown[repaired:]
-        found = boxes(scene.ground, scene.sections, inside, self._step_m, self._demand)
+        found = self._boxes(scene, inside, prior.offset_m)
         near = np.where(np.isfinite(found[:, 2]), found[:, 2], prior.offset_m)
         ridge = np.clip(near, prior.offset_m - tubes_m, prior.offset_m + tubes_m)
         ridge[own + repaired :] = near[own + repaired :]
         found[:, 2] = np.where(np.isfinite(found[:, 2]), ridge, np.nan)
         references = (prior.offset_m, prior.offset_m)
-        manifold, duals, converged = self._solve(scene, self._bound, found, inside, references, prior.offset_m, prior.duals)
+        manifold, duals, converged = self._solve(scene, self._bound, found, references, prior.offset_m, prior.duals)
         return manifold, duals, repaired, converged
 
+    def _boxes(self, scene: Scene, inside: F64, around: F64 | None) -> F64:
+        """Return the boxes of proposition 1, the ridges, and what is kept to inside of the boxes: low, high, shape (n, 5) [m].
+
+        That is the ample part of the box (`ample_boxes`); who is outside of it at `around`, shape (n,), comes towards it no
+        faster than P4 allows.
+        """
+        found = boxes(scene.ground, scene.sections, inside, self._step_m, self._demand)
+        kept = ample_boxes(scene.ground, scene.sections, found, self._step_m, self._demand)
+        if around is not None:
+            kept[:, 0] = np.maximum(found[:, 0], np.minimum(kept[:, 0], around + self._step_towards_m))
+            kept[:, 1] = np.minimum(found[:, 1], np.maximum(kept[:, 1], around - self._step_towards_m))
+        return np.hstack((found, kept))
+
     def _solve(
-        self, scene: Scene, program: OffsetProgram, found: F64, inside: F64, references: tuple[F64, ...], start: F64, duals: F64
+        self, scene: Scene, program: OffsetProgram, found: F64, references: tuple[F64, ...], start: F64, duals: F64
     ) -> tuple[Manifold, F64, bool]:
         own = self._stations.own
         wide = np.isfinite(found[:, 2])
@@ -136,9 +152,11 @@ class Solver:
         binds = wide & (np.arange(len(wide)) < own + valid)
         binds[:own] &= scene.confidence[:own] >= self._settings.rear_confidence
         low, high = np.where(binds, found[:, 0], -FAR_M), np.where(binds, found[:, 1], FAR_M)
+        kept_low, kept_high = np.where(binds, found[:, 3], -FAR_M), np.where(binds, found[:, 4], FAR_M)
         ridge = _filled(np.where(binds, found[:, 2], np.nan), scene.robot_m)
         anchors = tuple(np.where(binds, ref, ridge) for ref in references)
-        offset, duals, converged = program.solve((ridge, *anchors), low, high, np.where(np.isfinite(start), start, ridge), duals)
+        begin = np.where(np.isfinite(start), start, ridge)
+        offset, duals, converged = program.solve((ridge, *anchors), kept_low, kept_high, begin, duals)
         points = points_of(scene.sections, offset)
         clearance = along_manifold(scene.ground, points)
         whole = own + valid >= scene.end

@@ -56,7 +56,7 @@ class ClearanceManifold:
         self._settings, self._setup, self._limits = settings, setup, setup.limits
         self._stations = Stations.of(settings.solver)
         self._field = ArrivalField(settings.prediction)
-        self._solver = Solver(settings.solver, settings.tracker, self._stations, setup.robot_radius_m, setup.period_s)
+        self._solver = Solver(settings.solver, settings.tracker, self._stations, setup)
         self._tracker = Tracker(settings.tracker, settings.solver, self._solver, self._stations, setup.period_s)
         self._reader = Reader(settings, self._stations, self._solver.least_m)
         self._lookout = Lookout(settings.lookout, setup.limits, setup.robot_radius_m, settings.controller.speed_m_s)

@@ -12,6 +12,7 @@ from estimators.field_query import bilinear
 
 _FINE = 5  # samples of a tube, to either side
 BODY_M = 0.25  # from the middle of a boundary that closes in to its sides
+NARROW = 5.0  # cost of a station where the shield would stop; less, the nearer it is to ample
 AWAY = 4.0  # cost of a squared distance between the robot and its own station, per square metre
 
 
@@ -36,6 +37,8 @@ class Demand(NamedTuple):
     """What a station must have, and what it likes."""
 
     least_m: float  # rho_min
+    kept_m: float  # what the shield keeps; where there is less it lets nobody through
+    ample_m: float  # full speed is driven with it, and a place with as much is not narrow
     enough_m: float  # more clearance than this makes no better ridge
     centring: float  # clearance that a metre nearer to the centre line is worth
 
@@ -80,6 +83,37 @@ def box_around(ground: Ground, sections: Sections, i: int, inside: float, step_m
         found[side] = y
     found[2] = ridge
     return found
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def ample_boxes(ground: Ground, sections: Sections, found: F64, step_m: float, demand: Demand) -> F64:
+    """Return the part of each box around its ridge that keeps `ample_m`, or half of what the ridge has beyond rho_min, (n, 2).
+
+    Args:
+        ground: the predicted field.
+        sections: the cross-sections.
+        found: boxes and ridges, shape (n, 3), as `boxes` gives them; NaN where there is none.
+        step_m: of the search.
+        demand: what a station must have, and what it likes.
+    """
+    ample = found[:, :2].copy()
+    for i in range(len(found)):
+        if not np.isfinite(found[i, 2]):
+            continue
+        top = clearance_at(ground, sections, i, found[i, 2])
+        level = min(demand.ample_m, 0.5 * (demand.least_m + top))
+        for side in range(2):
+            sign = 1.0 if side else -1.0
+            end, y, before = found[i, side], found[i, 2], top
+            while sign * (end - y) > 1e-9:
+                ahead = sign * min(sign * (y + sign * step_m), sign * end)
+                here = clearance_at(ground, sections, i, ahead)
+                if here < level:
+                    y += (ahead - y) * (before - level) / max(before - here, 1e-9)
+                    break
+                y, before = ahead, here
+            ample[i, side] = y
+    return ample
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -134,8 +168,9 @@ def station_costs(rho: F64, apart: F64, offsets: F64, demand: Demand) -> F64:
     cost = np.empty(rho.shape)
     for i in range(rho.shape[0]):
         for j in range(rho.shape[1]):
-            short = max(0.0, demand.least_m - rho[i, j])
-            cost[i, j] = -worth(min(rho[i, j], apart[i, j]), offsets[j], demand) + 20.0 * short + (5.0 if short > 0.0 else 0.0)
+            short = max(0.0, demand.kept_m - rho[i, j])
+            narrow = min(max(0.0, demand.ample_m - rho[i, j]) / (demand.ample_m - demand.kept_m), 1.0)
+            cost[i, j] = -worth(min(rho[i, j], apart[i, j]), offsets[j], demand) + 20.0 * short + NARROW * narrow
             cost[i, j] += 3.0 * max(0.0, demand.least_m - apart[i, j])
     return cost
 

@@ -44,6 +44,9 @@ class SolverSettings(Settings):
     cross_samples: int = Field(default=31, ge=5, le=201, description="M_cross: samples of a cross-section")
     half_width_m: float = Field(default=1.0, gt=0.1, le=5.0, description="half of a cross-section")
     margin_m: float = Field(default=0.08, ge=0.0, le=1.0, description="rho_min beyond the robot's radius: 0.20 m - 0.12 m")
+    ample_m: float = Field(
+        default=0.15, gt=0.0, le=1.0, description="beyond what the shield keeps: room that is kept where there is as much"
+    )
     skip_s: float = Field(
         default=0.6, ge=0.0, le=10.0, description="N_skip = 3 steps: between two looks at the whole cross-section"
     )

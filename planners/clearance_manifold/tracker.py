@@ -65,6 +65,7 @@ class Tracker:
         self._offset_m: F64 = np.zeros(0)
         self._duals: F64 = np.zeros(len(self._stations.arcs_m))
         self._robot = SE2()
+        self._point: F64 = np.zeros(2)  # that follows the manifold
         self._lateral_m = 0.0
         self._stamp_ns = 0
         self._looked_ns = 0
@@ -86,6 +87,8 @@ class Tracker:
         on_chart = chart.project(self._points)
         order = np.argsort(on_chart[:, 0], kind="stable")
         self._arcs_m, self._offset_m = on_chart[order, 0], on_chart[order, 1]
+        arc_m, robot_m = chart.project(self._point[None])[0]
+        self._lateral_m = float(robot_m - np.interp(arc_m, self._arcs_m, self._offset_m))
 
     def advance(self, scene: Scene, belief: Belief, new_goal: bool) -> Continuation:
         """Return this tick's manifold and keep it."""
@@ -160,7 +163,7 @@ class Tracker:
 
     def _keep(self, scene: Scene, manifold: Manifold, duals: F64, belief: Belief) -> None:
         self._points, self._arcs_m, self._offset_m, self._duals = manifold.points, manifold.arcs_m, manifold.offset_m, duals
-        self._robot, self._stamp_ns = belief.odom_from_base, belief.stamp_ns
+        self._robot, self._point, self._stamp_ns = belief.odom_from_base, scene.robot, belief.stamp_ns
         self._lateral_m = float(scene.robot_m - manifold.offset_m[self._stations.own])
 
     def state(self) -> dict[str, NDArray[Any]]:
@@ -171,7 +174,7 @@ class Tracker:
             "arcs_m": self._arcs_m,
             "offset_m": self._offset_m,
             "duals": self._duals,
-            "robot": np.array([robot.x, robot.y, robot.yaw, self._lateral_m]),
+            "robot": np.array([robot.x, robot.y, robot.yaw, self._lateral_m, *self._point]),
             "stamps_ns": np.array([self._stamp_ns, self._looked_ns], np.int64),
         }
 
@@ -179,7 +182,8 @@ class Tracker:
         """Take over what `state` gave."""
         self._points, self._arcs_m = state["points"], state["arcs_m"]
         self._offset_m, self._duals = state["offset_m"], state["duals"]
-        x, y, yaw, self._lateral_m = state["robot"].tolist()
+        x, y, yaw, self._lateral_m, *point = state["robot"].tolist()
+        self._point = np.array(point)
         self._robot = SE2(x, y, yaw)
         self._stamp_ns, self._looked_ns = (int(stamp) for stamp in state["stamps_ns"])
 

@@ -98,6 +98,11 @@ class FieldCbf:
         )
         self._filtered: Form = FORMS[s.form]
 
+    @property
+    def kept_clear_m(self) -> float:
+        """The clearance at which the barrier and its least buffer leave no approach to what stands [m]."""
+        return self._barrier.safe_m + self._barrier.buffer_min_m
+
     def warm_up(self) -> None:
         """Compile the kernels, on an empty field; its arrays are read-only as a belief's are, which is a type of its own."""
         lattice = Lattice(-1.5, -1.5, 1.0, 3, 3)

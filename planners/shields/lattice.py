@@ -73,6 +73,11 @@ class LatticeShield:
             self._caps = np.array([limits.velocity.vx, max(limits.velocity.vy, 1.0), limits.velocity.wz])
             self._acceleration = np.array([limits.acceleration.vx, limits.acceleration.vy, limits.acceleration.wz])
 
+    @property
+    def kept_clear_m(self) -> float:
+        """The robot's radius and c_hard: nearer to what stands no rollout is feasible [m]."""
+        return self._radius_m + self._settings.hard_m
+
     def warm_up(self) -> None:
         """Compile the kernels; a belief's arrays are read-only, which is a type of its own."""
         label = frozen_array(np.zeros((3, 3), np.uint8))

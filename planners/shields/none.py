@@ -19,6 +19,11 @@ class NoShield:
     def __init__(self, settings: Settings, setup: ShieldSetup) -> None:
         """Take nothing."""
 
+    @property
+    def kept_clear_m(self) -> float:
+        """It knows of no obstacle."""
+        return 0.0
+
     def warm_up(self) -> None:
         """Nothing to compile."""
 

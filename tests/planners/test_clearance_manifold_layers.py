@@ -13,11 +13,20 @@ from planners.clearance_manifold.distance_kernels import lowered
 from planners.clearance_manifold.manifold import Stations
 from planners.clearance_manifold.offset_qp import OffsetProgram
 from planners.clearance_manifold.prediction import ArrivalField
-from planners.clearance_manifold.ridge_kernels import Demand, Ground, Sections, boxes, cheapest_branch
+from planners.clearance_manifold.ridge_kernels import (
+    NARROW,
+    Demand,
+    Ground,
+    Sections,
+    ample_boxes,
+    boxes,
+    cheapest_branch,
+    station_costs,
+)
 from planners.clearance_manifold.settings import ChartSettings, PredictionSettings, SolverSettings
 from tests.planners.synthetic import Box, Disc, belief_of
 
-DEMAND = Demand(least_m=0.2, enough_m=5.0, centring=0.0)
+DEMAND = Demand(least_m=0.2, kept_m=0.2, ample_m=0.35, enough_m=5.0, centring=0.0)
 
 
 def ground_of(belief):
@@ -38,6 +47,24 @@ def test_box_and_ridge_of_a_straight_corridor_are_the_closed_form(left_m, right_
     found = boxes(ground_of(belief), straight_sections([0.3, 1.0]), np.zeros(2), 0.02, DEMAND)
     expected = (-right_m + 0.2, left_m - 0.2, 0.5 * (left_m - right_m))
     assert found == pytest.approx(np.tile(expected, (2, 1)), abs=0.03)  # half a cell, and the scan's step
+
+
+@pytest.mark.parametrize(("half_m", "kept_m"), [(0.9, 0.55), (0.6, 0.25), (0.3, 0.05)])
+def test_the_ample_part_of_a_box_keeps_full_speed_or_half_of_what_there_is(half_m, kept_m):
+    """Between walls at +-half: rho = half - |y|, and 0.35 m are kept, or half way from 0.2 m to half."""
+    belief = belief_of([Box(-3, half_m, 3, 2), Box(-3, -2, 3, -half_m)])
+    ground, sections = ground_of(belief), straight_sections([0.3, 1.0])
+    found = boxes(ground, sections, np.zeros(2), 0.02, DEMAND)
+    assert ample_boxes(ground, sections, found, 0.02, DEMAND) == pytest.approx(np.tile((-kept_m, kept_m), (2, 1)), abs=0.03)
+
+
+def test_where_the_shield_would_stop_the_robot_a_station_costs_most_and_less_the_wider_it_is():
+    demand = DEMAND._replace(kept_m=0.27, ample_m=0.42, enough_m=0.6)
+    rho = np.array([[0.25, 0.27, 0.30, 0.42, 0.60]])
+    cost = station_costs(rho, np.full((1, 5), np.inf), np.zeros(5), demand)[0]
+    assert (np.diff(cost) < 0.0).all()
+    assert cost[2] - cost[3] == pytest.approx(0.12 + NARROW * 0.12 / 0.15)
+    assert cost[3] - cost[4] == pytest.approx(0.18)
 
 
 def test_inside_the_box_is_safe_and_outside_is_not():

@@ -225,6 +225,7 @@ def test_passage_narrower_than_twice_the_buffered_clearance_is_closed(half_width
     filtered = shield_of().filter(command_of(BodyTwist(0.4, 0.0, 0.0)), belief_of(walls), CAPS)
     assert (filtered.command.base.vx > 0.35) == passes
     assert filtered.diagnostics.infeasible != passes
+    assert (half_width_m > shield_of().kept_clear_m) == passes  # as it tells the planner
 
 
 def test_a_single_scalar_barrier_has_no_direction_between_two_closing_walls():
