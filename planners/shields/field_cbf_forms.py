@@ -74,6 +74,7 @@ def _by_boundaries(
     field: F32, rate: F32, overlap: Mask, corner: F64, cell_m: float, pose: F64, asked: F64, low: F64, high: F64,
     barrier: Barrier,
 ) -> tuple[float, float, F64, F64, float, float, bool]:  # fmt: skip
+    """Return the fields of an `Answer`: the samples and the velocity in one call, so that no array is boxed in between."""
     normal, distance, recede, enclosed = boundary_samples(
         field, rate, overlap, corner, cell_m, pose[:2], barrier.sample_radius_m, 2.0 * barrier.safe_m, barrier.directions
     )

@@ -17,7 +17,9 @@ Mask = NDArray[np.bool_]
 
 ALWAYS, FIELD_RATE, MATERIAL = 0, 1, 2  # what opens the gate of a boundary beyond the guard zone
 
-MIN_SLOPE = 0.5  # a distance field rises by 1 per metre; where much less is left, two boundaries cancel (medial axis)
+MIN_SLOPE = (
+    0.9  # a distance field rises by 1 per metre; where less is left, two boundaries cancel (medial axis), and none lies there
+)
 
 
 class Barrier(NamedTuple):

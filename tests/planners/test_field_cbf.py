@@ -130,6 +130,30 @@ def test_far_side_of_a_pillar_gives_no_sample():
     assert np.all(rate[seen] <= 0.01)  # the receding far side is not mixed in
 
 
+@pytest.mark.parametrize("x", np.arange(-0.6, 0.6, 0.15))
+def test_between_two_posts_no_boundary_is_seen_where_none_is(x):
+    """On the line between them their slopes cancel across, and what is left along it points at nothing."""
+    posts = [Box(-0.1, 0.7, 0.1, 2.0), Box(-0.1, -2.0, 0.1, -0.7)]
+    belief = belief_of(posts, SE2(float(x), 0.0, 0.0))
+    field, lattice, robot = belief.clearance, belief.clearance.lattice, np.array([x, 0.0])
+    normal, distance, _, _ = boundary_samples(
+        field.clearance_m,
+        field.rate_m_s,
+        field.overlap,
+        np.array([lattice.x_m, lattice.y_m]),
+        lattice.cell_m,
+        robot,
+        1.1,
+        0.9,
+        16,
+    )
+    seen = np.isfinite(distance)
+    assert seen.any()
+    points = robot - distance[seen, None] * normal[seen]
+    true_m = np.min([post.distance(*points.T) for post in posts], axis=0)
+    assert np.max(np.abs(true_m)) < 0.12
+
+
 def test_buffer_follows_equation_8_between_its_bounds():
     normal, asked = np.array([[-1.0, 0.0]]), np.zeros(2)
     barrier = Barrier(0.22, 16, 0.7, 2.0, 0.3, 0.4, 0.2, 1.0, 0.05, 0.25, MATERIAL)
