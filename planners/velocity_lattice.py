@@ -176,6 +176,16 @@ def after_latency(pose: F64, now: F64, asked: F64, drive: Drive) -> tuple[F64, F
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def least_room(points: F64, around: Ground) -> float:
+    """Return the least clearance to what stands still at some points, shape (n, 2), surface to surface [m]."""
+    least = np.inf
+    for i in range(len(points)):
+        c = bilinear(around.clearance, around.corner_x, around.corner_y, around.cell_m, points[i, 0], points[i, 1])
+        least = min(least, c - around.radius_m)
+    return least
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def roll_out(pose: F64, now: F64, speeds: F64, turns: F64, drive: Drive, step_s: float, steps: int, around: Ground) -> Rollouts:
     """Drive every pair of a speed and a turn from a pose, shape (3,), and a velocity, shape (2,).
 

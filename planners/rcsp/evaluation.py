@@ -28,6 +28,7 @@ from planners.risk import objective_error, tail_count
 from planners.velocity_lattice import Rollouts, path_of
 
 KINDS = {"inverse_clearance": INVERSE_CLEARANCE, "violation": VIOLATION, "near_miss": NEAR_MISS}
+_LEAST_SAFE_M = 1e-3  # risk is measured in shares of it
 REWARD_RANGE = 2.0  # B_R: rewards are cut to [-1, 1]
 
 
@@ -43,6 +44,7 @@ class Evaluation:
     clearance: F32  # (commands, scenarios), tail first
     futures: Futures
     tail: int  # scenarios in it
+    static_safe_m: float  # clearance beyond which what stands still was no risk
 
     def best(self, effort: F64) -> tuple[int, bool]:
         """Return the command to ask for, and whether it is free: the best by objective, else, where none is, the least risky.
@@ -70,7 +72,7 @@ class Evaluator:
         self._risk = Risk(KINDS[r.kind], r.safe_m, r.collision, r.depth_m)
         self._bound = max(largest(self._risk, r.safe_m), largest(self._risk, r.static_safe_m))
 
-    def evaluate(self, rolled: Rollouts, reward: F64, nominal: int, scenarios: int, chance: Chance) -> Evaluation:
+    def evaluate(self, rolled: Rollouts, reward: F64, nominal: int, scenarios: int, chance: Chance, room_m: float) -> Evaluation:
         """Return the evaluation of all commands in `scenarios` futures, the same for every command.
 
         Args:
@@ -79,12 +81,22 @@ class Evaluator:
             nominal: the command that stands for the motion of the robot that obstacles react to.
             scenarios: N.
             chance: what futures are drawn from.
+            room_m: least clearance to what stands still on the way ahead.
         """
-        s = self._settings
+        s, static_safe_m = self._settings, self.static_safe_m(room_m)
         futures, clearance = self._held_against(rolled, path_of(rolled, nominal), scenarios, chance)
         tail = tail_of(s.risk, scenarios)
-        risk, room_m, free = tails(clearance, rolled.static_m, rolled.brakable, tail, self._risk, s.risk.static_safe_m)
-        return Evaluation(reward - s.risk.weight * risk, reward, risk, room_m, free, clearance, futures, tail)
+        risk, tail_room_m, free = tails(clearance, rolled.static_m, rolled.brakable, tail, self._risk, static_safe_m)
+        return Evaluation(reward - s.risk.weight * risk, reward, risk, tail_room_m, free, clearance, futures, tail, static_safe_m)
+
+    def static_safe_m(self, room_m: float) -> float:
+        """Return the clearance beyond which what stands still is no risk, on a way that has so little room.
+
+        The way through a gap is as narrow as it is, however long one waits before it: only what comes nearer than the way itself
+        leads is a risk.  A way through what stands says nothing.
+        """
+        s = self._settings
+        return min(s.risk.static_safe_m, max(room_m, s.hold_m, _LEAST_SAFE_M)) if room_m > 0.0 else s.risk.static_safe_m
 
     def _held_against(self, rolled: Rollouts, robot: F64, scenarios: int, chance: Chance) -> tuple[Futures, F32]:
         far_m, predictor = self._settings.risk.safe_m, self._predictor
@@ -98,9 +110,8 @@ class Evaluator:
 
     def mean_risk(self, told: Evaluation, rolled: Rollouts, command: int) -> float:
         """Return the mean over the scenarios of a command's risk."""
-        s = self._settings.risk
         static_m, brakable = float(rolled.static_m[command]), bool(rolled.brakable[command])
-        return float(mean_risk(told.clearance[command], static_m, brakable, self._risk, s.static_safe_m))
+        return float(mean_risk(told.clearance[command], static_m, brakable, self._risk, told.static_safe_m))
 
     def bound(self, scenarios: int) -> float:
         """Return epsilon_N(delta) of proposition C.3."""

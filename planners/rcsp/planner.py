@@ -32,7 +32,7 @@ from planners.rcsp.rehearsal import rehearse
 from planners.rcsp.settings import RcspSettings
 from planners.router import Route
 from planners.static_field import movers, surroundings
-from planners.velocity_lattice import Drive, Ground, Rollouts, VelocityLattice, after_latency, path_of, roll_out
+from planners.velocity_lattice import Drive, Ground, Rollouts, VelocityLattice, after_latency, least_room, path_of, roll_out
 
 _SPACING_M = 0.12  # of the points of the route that progress is measured along
 _FIELD_SPARE_M = 0.15  # what the clearance is known beyond where it matters, so that it need not be looked up at every step
@@ -61,6 +61,7 @@ class Rcsp:
         self._chance = Chance(setup.seed, "rcsp")
         backwards = np.maximum(-self._lattice.speed_m_s, 0.0) / self._lattice.speed_m_s[-1]
         self._reverse_cost = settings.reward.reverse * np.repeat(backwards, len(self._lattice.turn_rad_s))  # (commands,)
+        self._reach_m = float(self._lattice.speed_m_s[-1]) * settings.step_s * settings.steps  # of full speed
         self._looks = np.array(_judged_at(settings.steps))
         self._standing = self._lattice.index_of_rest
         self._effort = self._lattice.change_from(self._standing)
@@ -90,10 +91,11 @@ class Rcsp:
             self._last = self._standing
             said = RcspDiagnostics(stopped=reason, budget_ms=(budget_ns or 0) / 1e6, obstacles=obstacles)
             return Plan(BodyTwist(), diagnostics=said)
-        rolled = self._rolled_out(belief)
-        reward = self._reward(belief, route, rolled)
+        path, along = self._ahead(route)
+        rolled, room_m = self._rolled_out(belief, path[1 : np.searchsorted(along, self._reach_m, side="right")])
+        reward = self._reward(belief, path, along, rolled)
         chance = Chance(self._setup.seed, "rcsp", belief.tick) if self._settings.fresh_draws else self._chance
-        told = self._evaluator.evaluate(rolled, reward, self._last, scenarios, chance)
+        told = self._evaluator.evaluate(rolled, reward, self._last, scenarios, chance, room_m)
         self._last, free = told.best(self._effort)
         return self._plan(belief, rolled, told, free, budget_ns)
 
@@ -109,8 +111,13 @@ class Rcsp:
             return "arrived"
         return ""
 
-    def _rolled_out(self, belief: Belief) -> Rollouts:
-        """Return where each command leads from when it takes hold, in the field of what stands still."""
+    def _ahead(self, route: Route) -> tuple[F64, F64]:
+        """Return the route as far as rollouts reach, shape (m, 2), and the distance along it of its points, shape (m,)."""
+        ahead: tuple[F64, F64] = beginning(route.path_in_odom, self._reach_m + _ROUTE_SPARE_M, _SPACING_M)
+        return ahead
+
+    def _rolled_out(self, belief: Belief, way: F64) -> tuple[Rollouts, float]:
+        """Return where each command leads from when it takes hold, in the field of what stands still, and the room on the way."""
         s, pose, radius_m = self._settings, belief.odom_from_base, self._setup.robot_radius_m
         last = self._lattice.twist(self._last)
         start, now = after_latency(
@@ -127,20 +134,18 @@ class Rcsp:
         )  # fmt: skip
         speeds, turns = self._lattice.speed_m_s, self._lattice.turn_rad_s
         rolled: Rollouts = roll_out(start, now, speeds, turns, self._drive, s.step_s, s.steps, around)
-        return rolled
+        return rolled, least_room(way, around)
 
-    def _reward(self, belief: Belief, route: Route, rolled: Rollouts) -> F64:
+    def _reward(self, belief: Belief, path: F64, along: F64, rolled: Rollouts) -> F64:
         """Return R of every command, shape (commands,): progress along the route over what full speed makes, less change."""
-        s, r = self._settings, self._settings.reward
-        reach_m = self._lattice.speed_m_s[-1] * s.step_s * s.steps
-        path, along = beginning(route.path_in_odom, reach_m + _ROUTE_SPARE_M, _SPACING_M)
+        r = self._settings.reward
         pose = belief.odom_from_base
         made_m = way_made(
             np.array([pose.x, pose.y, pose.yaw]), rolled.x, rolled.y, rolled.yaw, self._looks, path, along,
             r.lateral, r.heading_m_per_rad, r.look_ahead_m,
         )  # fmt: skip
         cost = self._reverse_cost + r.change * self._lattice.change_from(self._last)
-        return np.asarray(np.minimum(np.maximum(made_m / reach_m - cost, -1.0), 1.0))
+        return np.asarray(np.minimum(np.maximum(made_m / self._reach_m - cost, -1.0), 1.0))
 
     def _plan(self, belief: Belief, rolled: Rollouts, told: Evaluation, free: bool, budget_ns: int | None) -> Plan:
         chosen = self._last

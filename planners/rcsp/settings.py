@@ -19,7 +19,9 @@ class RiskSettings(Settings):
     tail_fraction: float = Field(default=0.1, gt=0.0, le=1.0, description="alpha")
     weight: float = Field(default=2.0, ge=0.0, le=1000.0, description="lambda")
     safe_m: float = Field(default=0.4, gt=0.0, le=5.0, description="clearance to what moves beyond which there is no risk")
-    static_safe_m: float = Field(default=0.15, gt=0.0, le=5.0, description="likewise to what stands still")
+    static_safe_m: float = Field(
+        default=0.15, gt=0.0, le=5.0, description="likewise to what stands still; less where the route has less"
+    )
     collision: float = Field(default=3.0, ge=0.0, le=100.0, description="added by near_miss where surfaces meet")
     depth_m: float = Field(default=0.3, gt=0.0, le=2.0, description="overlap beyond which risk does not grow")
     delta: float = Field(

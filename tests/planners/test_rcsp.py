@@ -9,6 +9,7 @@ import pytest
 
 from drivers.interface.commands import BodyTwist
 from drivers.interface.errors import ConfigurationError
+from drivers.interface.geometry import SE2
 from drivers.interface.samples import frozen_array
 from estimators.belief import Track
 from planners.planner import Anytime, PlannerSetup
@@ -96,6 +97,13 @@ def test_it_does_not_commit_to_a_gap_that_closes():
     trace = run([mover], (4.5, 0.0), static=gate)
     assert trace.reached(4.5, 0.0)
     assert trace.min_clearance_m > 0.0
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.15])
+def test_a_gap_that_stays_narrow_is_not_dreaded(yaw):
+    """Eight centimetres on either side, where fifteen are no risk: waiting does not widen them, and the way leads through."""
+    gate = (*WALLS, Box(0.6, -1.5, 0.9, -0.33), Box(0.6, 0.33, 0.9, 1.5))
+    assert planned(walls=gate, pose=SE2(0.1, 0.0, yaw)).base.vx > 0.4
 
 
 def test_far_from_everybody_it_drives_fast_and_straight():
