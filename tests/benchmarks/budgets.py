@@ -17,16 +17,19 @@ class Budget(Settings):
     unit: str = "ms"
     at_most: float | None = Field(None, ge=0.0, description="of the median; 0: it must not happen at all")
     p99_at_most: float | None = Field(None, gt=0.0, description="of the 99th percentile")
+    mean_at_most: float | None = Field(None, gt=0.0, description="of the mean")
     at_least: float | None = Field(None, gt=0.0, description="for figures where more is better")
     ratio_at_most: float | None = Field(None, gt=0.0, description="of the median over the peer's")
     p99_ratio_at_most: float | None = Field(None, gt=0.0, description="of the 99th percentile over the peer's")
-    note: str = Field("", description="where the bound comes from, or what was published")
+    published: float | None = Field(None, gt=0.0, description="what the paper's authors measured, a mean on their machine")
+    note: str = Field("", description="where the bound comes from, or what is measured")
 
     def broken_by(self, figure: Figure) -> tuple[str, ...]:
         """Return what the figure breaks, each as a short text; a bounded quantity that was not measured is broken too."""
         upper = (
             ("p50", figure.value, self.at_most),
             ("p99", figure.p99, self.p99_at_most),
+            ("mean", figure.mean, self.mean_at_most),
             ("p50 ratio", figure.ratio, self.ratio_at_most),
             ("p99 ratio", figure.p99_ratio, self.p99_ratio_at_most),
         )
@@ -42,6 +45,7 @@ class Budget(Settings):
         bounds = (
             ("<= {:g}", self.at_most),
             ("p99 <= {:g}", self.p99_at_most),
+            ("mean <= {:g}", self.mean_at_most),
             (">= {:g}", self.at_least),
             ("ratio <= {:g}", self.ratio_at_most),
             ("p99 ratio <= {:g}", self.p99_ratio_at_most),

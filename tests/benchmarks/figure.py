@@ -22,6 +22,7 @@ class Figure:
     peer: str = ""
     peer_value: float | None = None
     peer_p99: float | None = None
+    mean: float | None = None
 
     @property
     def ratio(self) -> float | None:
@@ -35,12 +36,13 @@ class Figure:
 
 
 def of_distribution(name: str, values: Sequence[float], unit: str = "ms", peer: str = "", others: Sequence[float] = ()) -> Figure:
-    """Return median and 99th percentile of the values, and of the peer's where there is one."""
+    """Return median, 99th percentile and mean of the values, and the first two of the peer's where there is one."""
     p50, p99 = (float(value) for value in np.percentile(values, (50, 99)))
+    mean = float(np.mean(values))
     if not others:
-        return Figure(name, p50, p99, unit)
+        return Figure(name, p50, p99, unit, mean=mean)
     peer_p50, peer_p99 = (float(value) for value in np.percentile(others, (50, 99)))
-    return Figure(name, p50, p99, unit, peer, peer_p50, peer_p99)
+    return Figure(name, p50, p99, unit, peer, peer_p50, peer_p99, mean)
 
 
 def timed(name: str, call: Callable[[], object], peer: str = "", peer_call: Callable[[], object] | None = None) -> Figure:

@@ -1,4 +1,6 @@
-"""Measures every figure and prints it beside its budget and its peer: `python -m tests.benchmarks.run [NAME ...]`.
+"""Measures every figure and prints it beside its budget, what was published and its peer.
+
+`python -m tests.benchmarks.run [NAME ...]`, or `make bench`.
 
 Each `bench_*.py` here offers `cases()` (names and calls to be timed), `figures()` (what it measured itself), or both.  With
 `cases()` may come `peers()` (calls of the same names, of someone else's code on the same input) and their common name `PEER`.
@@ -25,6 +27,10 @@ from tests.benchmarks.figure import Figure, timed
 
 HERE = Path(__file__).parent
 NO_BUDGET = "no budget"
+COLUMNS = (
+    "figure", "p50", "mean", "p99", "unit", "budget", "published",
+    "peer", "peer p50", "peer p99", "ratio", "p99 ratio", "verdict",
+)  # fmt: skip
 
 
 def modules() -> list[ModuleType]:
@@ -50,14 +56,15 @@ def verdict(figure: Figure, budgets: Mapping[str, Budget]) -> tuple[str, ...]:
 
 def table_of(figures: list[Figure], budgets: Mapping[str, Budget]) -> Table:
     """Lay the figures out beside budget and peer."""
-    table = Table("figure", "p50", "p99", "unit", "budget", "peer", "peer p50", "peer p99", "ratio", "p99 ratio", "verdict")
+    table = Table(*COLUMNS)
     for figure in figures:
-        wrong = verdict(figure, budgets)
+        wrong, budget = verdict(figure, budgets), budgets.get(figure.name)
         table.add_row(
             figure.name,
-            *(_number(value) for value in (figure.value, figure.p99)),
+            *(_number(value) for value in (figure.value, figure.mean, figure.p99)),
             figure.unit,
-            str(budgets.get(figure.name, "none")),
+            "none" if budget is None else str(budget),
+            _number(None if budget is None else budget.published),
             figure.peer,
             *(_number(value) for value in (figure.peer_value, figure.peer_p99, figure.ratio, figure.p99_ratio)),
             f"[red]{'; '.join(wrong)}[/red]" if wrong else "[green]ok[/green]",

@@ -5,7 +5,7 @@ from pydantic import ValidationError
 
 from tests.benchmarks.budgets import Budget, load_budgets
 from tests.benchmarks.figure import Figure, of_distribution, timed
-from tests.benchmarks.run import NO_BUDGET, measured, verdict
+from tests.benchmarks.run import NO_BUDGET, measured, table_of, verdict
 
 
 def test_the_shipped_budgets_cover_every_stage_and_planner():
@@ -21,6 +21,7 @@ def test_the_shipped_budgets_cover_every_stage_and_planner():
         (Budget(at_most=2.0), Figure("f", 2.1), ("p50 over 2",)),
         (Budget(at_most=2.0, p99_at_most=3.0), Figure("f", 1.0, p99=3.5), ("p99 over 3",)),
         (Budget(p99_at_most=3.0), Figure("f", 1.0), ("p99 over 3",)),  # not measured is not met
+        (Budget(at_most=2.0, mean_at_most=2.0), Figure("f", 1.0, mean=2.5), ("mean over 2",)),
         (Budget(unit="x", at_least=6.0), Figure("f", 5.0, unit="x"), ("under 6",)),
         (Budget(at_least=6.0, unit="x"), Figure("f", float("nan"), unit="x"), ("under 6",)),
         (Budget(at_most=6.0), Figure("f", float("nan")), ("p50 over 6",)),
@@ -47,6 +48,13 @@ def test_a_budget_with_an_unknown_key_is_refused():
 def test_median_and_tail_are_those_of_the_sample():
     figure = of_distribution("f", [float(k) for k in range(101)], "us", "C", [2.0 * k for k in range(101)])
     assert (figure.value, figure.p99, figure.ratio, figure.p99_ratio) == (50.0, 99.0, 0.5, 0.5)
+    assert of_distribution("f", [0.0, 0.0, 3.0]).mean == 1.0
+
+
+def test_what_was_published_stands_beside_the_figure():
+    table = table_of([Figure("manifold_solver", 0.4)], load_budgets())
+    published = next(column for column in table.columns if column.header == "published")
+    assert list(published.cells) == ["5.39"]
 
 
 def test_a_peer_takes_turns_with_us():
