@@ -7,6 +7,10 @@ from numba import njit
 
 from estimators.belief import F64, Mask
 
+STRAIGHT_ON_M = 0.2  # with a miss smaller than this somebody comes straight on
+CROSSING = 0.3  # the share of a velocity that leads across the way of who crosses
+CHANGE_M = 0.1  # who turns out to miss by this on the other hand passes there
+
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def brakable(distance_m: float, deceleration_m_s2: float, delay_s: float) -> float:
@@ -62,11 +66,15 @@ def longitudinal(u_x: float, u_y: float, t_x: float, t_y: float, speed: float, c
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def give_way(u: F64, robot: F64, closing: F64, apart_m: float, horizon_s: float, side: F64) -> F64:
+def give_way(
+    u: F64, robot: F64, closing: F64, apart_m: float, horizon_s: float, side: F64, tangent: F64, hand: float
+) -> tuple[F64, float]:
     """Return the velocity nearest to u, shape (2,), with which what closes in passes at `apart_m` if it goes on as it does.
 
-    Standing still, the robot would be missed by the vector m after the time t of closest approach; with u . m / |m| <=
-    (|m| - apart) / t it is missed by enough: it does not cross in front of who crosses before it.
+    Standing still, the robot would be missed by the signed distance m, across the other's way, after the time t of closest
+    approach; with a velocity across that way of at most (m - apart) / t it is missed by enough: it does not cross in front of
+    who crosses before it.  On which hand he passes is kept while he comes: a miss near zero changes its sign with the noise
+    of the velocity that it follows from.
 
     Args:
         u: velocity in odom [m/s].
@@ -74,24 +82,34 @@ def give_way(u: F64, robot: F64, closing: F64, apart_m: float, horizon_s: float,
         closing: middle, velocity and number of cells of the boundary, shape (5,).
         apart_m: between the middle and the robot's centre.
         horizon_s: later encounters do not count.
-        side: where to go when it comes straight on, shape (2,), unit.
+        side: where the manifold leads to, shape (2,), unit: the robot goes there when somebody comes straight on along the way.
+        tangent: of the way, shape (2,), unit; behind who comes straight on across it, the robot passes.
+        hand: on which he passes at the tick before, seen along his way: 1 left of the robot, -1 right of it; 0: nobody came.
+
+    Returns:
+        The velocity, and the hand on which he passes now.
     """
     speed2 = closing[2] * closing[2] + closing[3] * closing[3]
     if closing[4] == 0.0 or speed2 < 0.01:
-        return u
+        return u, 0.0
     x, y = closing[0] - robot[0], closing[1] - robot[1]
     t = -(x * closing[2] + y * closing[3]) / speed2
     if not 0.0 < t < horizon_s:
-        return u
-    miss_x, miss_y = x + closing[2] * t, y + closing[3] * t
-    miss = np.hypot(miss_x, miss_y)
-    if miss < 0.1:
-        miss_x, miss_y = -side[0], -side[1]
-        length = 1.0
-    else:
-        length = miss
-    n_x, n_y = miss_x / length, miss_y / length
-    excess = u[0] * n_x + u[1] * n_y - (miss - apart_m) / max(t, 0.5)
+        return u, 0.0
+    speed = np.sqrt(speed2)
+    left_x, left_y = -closing[3] / speed, closing[2] / speed
+    miss = x * left_x + y * left_y  # what is along his way is over at t
+    if hand == 0.0 and abs(miss) < STRAIGHT_ON_M:
+        across = tangent[0] * closing[3] - tangent[1] * closing[2]  # his speed to the left, across the way
+        if abs(across) > CROSSING * speed:
+            behind = across * (tangent[0] * left_y - tangent[1] * left_x)
+            hand = 1.0 if behind > 0.0 else -1.0
+        else:
+            hand = -1.0 if side[0] * left_x + side[1] * left_y > 0.0 else 1.0
+    elif hand == 0.0 or hand * miss < -CHANGE_M:
+        hand = 1.0 if miss > 0.0 else -1.0
+    n_x, n_y = hand * left_x, hand * left_y
+    excess = u[0] * n_x + u[1] * n_y - (hand * miss - apart_m) / max(t, 0.5)
     if excess <= 0.0:
-        return u
-    return np.array([u[0] - excess * n_x, u[1] - excess * n_y])
+        return u, hand
+    return np.array([u[0] - excess * n_x, u[1] - excess * n_y]), hand

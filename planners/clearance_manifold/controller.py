@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivers.interface.commands import BaseLimits, BodyTwist
 from drivers.interface.geometry import SE2, wrap_angle
 from estimators.belief import F64
 from planners.clearance_manifold.control_kernels import brakable, give_way, longitudinal
+from planners.clearance_manifold.governor import Around, Governor, Motion, approach
+from planners.clearance_manifold.governor_kernels import time_to_pass
 from planners.clearance_manifold.settings import ControllerSettings
 from planners.point_ds.kernels import within
 
-LEFT = np.array([0.0, 1.0])
+LEAD_S = 0.4  # the robot is out of the way so long before somebody passes: he is as wide as he is, and so is it
+NEAR_M = 1.0  # who passes at more than this does not press
+APPROACH = 0.25  # of the jerk, on the way to the manifold: the rest is left for what else happens
 STANDSTILL_M_S = 0.01  # a base that cannot strafe turns on the spot below this
 
 
@@ -27,20 +33,26 @@ class Situation:
     ridge_clearance_m: float  # rho_ridge, near the robot
     margin_m: float  # M_min: least predicted clearance beyond rho_min ahead
     commitment: float  # a_pred
-    free_m: float  # how far ahead it may go at most
+    free_m: float  # how far ahead it may go at most: to the end of what is wide, known and before the goal,
+    clear_m: float  # and to where somebody unseen may come
     most_m_s: float  # and how fast, whatever the clearance
     heading_rad: float  # where the robot should look, in odom
     feasible: bool
     robot: F64  # (2,), the point that is controlled, in odom
+    velocity: F64  # (2,), of the base, in odom
     closing: F64  # (5,), what closes in
 
 
 class ManifoldController:
     """Turns a situation into a body twist."""
 
-    def __init__(self, settings: ControllerSettings, limits: BaseLimits) -> None:
-        """Take the gains and the limits."""
-        self._settings, self._limits = settings, limits
+    def __init__(self, settings: ControllerSettings, limits: BaseLimits, governor: Governor) -> None:
+        """Take the gains, the limits and what smooths the velocity, which is carried on with this one's state."""
+        self._settings, self._limits, self._governor = settings, limits, governor
+        self._hand = 0.0  # on which who comes passes
+        self._delay_s = settings.delay_s
+        if limits.holonomic and governor.enabled:  # braking begins with a ramp
+            self._delay_s += 0.5 * settings.deceleration_m_s2 / governor.ease_m_s3
 
     def speed(self, at: Situation) -> float:
         """Return k_parallel: cruise by clearance and margin, plus commitment, below what can be braked."""
@@ -49,34 +61,69 @@ class ManifoldController:
         margin = min(max((at.margin_m - s.margin_low_m) / (s.margin_high_m - s.margin_low_m), 0.0), 1.0)
         cruise = s.speed_m_s * max(room, 0.0) * margin
         wanted = min(max(cruise + at.commitment * s.commitment_m_s, 0.0), s.speed_m_s)
-        return float(min(wanted, at.most_m_s, brakable(at.free_m, s.deceleration_m_s2, s.delay_s)))
+        return float(min(wanted, at.most_m_s, self._brakable(min(at.free_m, at.clear_m))))
 
-    def command(self, at: Situation, yaw: float) -> tuple[BodyTwist, float]:
+    def command(self, at: Situation, yaw: float, around: Around) -> tuple[BodyTwist, float]:
         """Return the twist and the speed along the manifold."""
-        s, cap = self._settings, self._limits.velocity
+        cap = self._limits.velocity
         body = SE2(0.0, 0.0, -yaw)
-        push = body.apply(-s.lateral_gain_per_s * at.error)
-        tangent = body.apply(at.tangent)
-        speed = self.speed(at)
-        if at.feasible and speed + float(push @ tangent) < s.progress_m_s:
-            speed = min(s.progress_m_s, brakable(at.free_m, s.deceleration_m_s2, s.delay_s))
+        pass_s = time_to_pass(at.robot, at.closing, NEAR_M) - LEAD_S
+        least_m_s3 = self._governor.pressing(float(np.hypot(*at.error)), pass_s)
+        push, tangent, speed = body.apply(self._push(at.error, least_m_s3)), body.apply(at.tangent), self.speed(at)
+        if at.feasible and speed + float(push @ tangent) < self._settings.progress_m_s:
+            speed = min(self._settings.progress_m_s, self._brakable(min(at.free_m, at.clear_m)))
         if not self._limits.holonomic:
-            u = self._yielding(push + speed * tangent, at, body)
+            u = body.apply(self._yielding(body.inverse().apply(push + speed * tangent), at))
             return self._look_ahead_twist(u, speed, self.turn(at, yaw)), speed
-        low_x = -cap.vx if self._limits.reverse else 0.0
-        push_x, push_y = within(float(push[0]), float(push[1]), low_x if low_x < 0.0 else -1e-9, cap.vx, cap.vy)
-        k = longitudinal(push_x, push_y, float(tangent[0]), float(tangent[1]), speed, cap.vx, cap.vy, low_x)
-        u = self._yielding(np.array([push_x, push_y]) + k * tangent, at, body)
-        vx, vy = within(float(u[0]), float(u[1]), low_x if low_x < 0.0 else -1e-9, cap.vx, cap.vy)
-        return BodyTwist(max(vx, low_x), vy, self.turn(at, yaw)), k
+        low_x = -cap.vx if self._limits.reverse else -1e-9
+        push_x, push_y = within(float(push[0]), float(push[1]), low_x, cap.vx, cap.vy)
+        k = longitudinal(push_x, push_y, float(tangent[0]), float(tangent[1]), speed, cap.vx, cap.vy, min(low_x, 0.0))
+        along = body.inverse().apply(np.array([push_x, push_y]) + k * tangent)
+        u = body.apply(self._smoothed(along, at, around, least_m_s3, pass_s))
+        vx, vy = within(float(u[0]), float(u[1]), low_x, cap.vx, cap.vy)
+        return BodyTwist(max(vx, low_x, -cap.vx if self._limits.reverse else 0.0), vy, self.turn(at, yaw)), k
 
-    def _yielding(self, u: F64, at: Situation, body: SE2) -> F64:
-        """Return the velocity, shape (2,), in the body frame, changed so that what closes in passes at a distance."""
+    def _push(self, error: F64, jerk_m_s3: float) -> F64:
+        """Return equation 4's velocity towards the manifold, shape (2,), in odom, if it can still end there with that jerk."""
+        error_m, gain_per_s = float(np.hypot(*error)), self._settings.lateral_gain_per_s
+        if not self._limits.holonomic or not self._governor.enabled or error_m < 1e-9:
+            return np.asarray(-gain_per_s * error)
+        speed = min(gain_per_s * error_m, approach(error_m, APPROACH * jerk_m_s3))
+        return np.asarray(-speed / error_m * error)
+
+    def _smoothed(self, along: F64, at: Situation, around: Around, least_m_s3: float, pass_s: float) -> F64:
+        """Return the velocity to ask for, shape (2,), of that along the manifold, in odom: giving way, and smoothed."""
+        yielding = self._yielding(along, at)
+        least_m_s3 = max(least_m_s3, self._governor.to_change(float(np.hypot(*(yielding - along))), pass_s))
+        return self._governor.follow(
+            yielding, Motion(at.robot, at.velocity, at.tangent, at.free_m, at.clear_m), around, least_m_s3
+        )
+
+    def _brakable(self, free_m: float) -> float:
+        return float(brakable(free_m, self._settings.deceleration_m_s2, self._delay_s))
+
+    def _yielding(self, u: F64, at: Situation) -> F64:
+        """Return the velocity, shape (2,), in odom, changed so that what closes in passes at a distance."""
         s = self._settings
-        away = -at.error / max(float(np.hypot(*at.error)), 1e-9) if float(np.hypot(*at.error)) > 1e-6 else body.apply(LEFT)
-        odom = body.inverse()
-        yielding = give_way(odom.apply(u), at.robot, at.closing, s.yield_m, s.yield_horizon_s, away)
-        return body.apply(yielding)
+        error_m = float(np.hypot(*at.error))
+        side = -at.error / error_m if error_m > 1e-6 else np.array([-at.tangent[1], at.tangent[0]])
+        yielding: F64
+        yielding, self._hand = give_way(u, at.robot, at.closing, s.yield_m, s.yield_horizon_s, side, at.tangent, self._hand)
+        return yielding
+
+    def reset(self) -> None:
+        """Stand, with nobody coming."""
+        self._hand = 0.0
+        self._governor.reset()
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """Return what is carried on, as named arrays."""
+        return {"hand": np.array(self._hand), **self._governor.state()}
+
+    def take(self, state: dict[str, NDArray[Any]]) -> None:
+        """Take over what `state` gave."""
+        self._hand = float(state["hand"])
+        self._governor.take(state)
 
     def turn(self, at: Situation, yaw: float) -> float:
         """Return wz towards the heading wanted."""

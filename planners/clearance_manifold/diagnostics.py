@@ -58,7 +58,7 @@ def diagnose(
         utilisation=utilisation,
         deviation_m=told.deviation_m,
         reach_m=told.manifold.reach_m,
-        free_m=at.free_m,
+        free_m=min(at.free_m, at.clear_m),
         rho_ridge_m=at.ridge_clearance_m,
         margin_m=at.margin_m,
         commitment=at.commitment,

@@ -23,6 +23,7 @@ from planners.clearance_manifold.controller import ManifoldController, Situation
 from planners.clearance_manifold.diagnostics import ManifoldDiagnostics, diagnose
 from planners.clearance_manifold.drawings import drawn
 from planners.clearance_manifold.extraction import Scene, Solver
+from planners.clearance_manifold.governor import Around, Governor
 from planners.clearance_manifold.lookout import Lookout, Outlook
 from planners.clearance_manifold.lookout_kernels import Seen
 from planners.clearance_manifold.manifold import Stations
@@ -60,18 +61,17 @@ class ClearanceManifold:
         self._tracker = Tracker(settings.tracker, settings.solver, self._solver, self._stations, setup.period_s)
         self._reader = Reader(settings, self._stations, self._solver.least_m)
         self._lookout = Lookout(settings.lookout, setup.limits, setup.robot_radius_m, settings.controller.speed_m_s)
-        self._controller = ManifoldController(settings.controller, setup.limits)
+        self._governor = Governor(settings.smoothness, setup.limits, setup.period_s)
+        self._controller = ManifoldController(settings.controller, setup.limits, self._governor)
         self._waiting = Waiting(settings.waiting, setup.limits.velocity.wz)
         self._chart: Chart | None = None
         self._arc_m = 0.0  # of the robot on the chart
         self._ticks = np.zeros(2, np.int64)  # continued, all
-        self._asked = BodyTwist()  # at the tick before
-        smoothing_s = settings.controller.smoothing_s
-        self._share = 1.0 - math.exp(-setup.period_s / smoothing_s) if smoothing_s > 0.0 else 1.0
 
     def warm_up(self) -> None:
         """Compile every kernel, on a scene of its own."""
         self._field.warm_up()
+        type(self)(self._settings, self._setup)._governor.warm_up()
         rehearse(type(self)(self._settings, self._setup))
 
     def plan(self, belief: Belief, route: Route) -> Plan:
@@ -90,20 +90,15 @@ class ClearanceManifold:
         outlook = self._outlook(scene, told, belief)
         left_m = self._chart.length_m - self._arc_m
         situation = self._reader.situation(told.manifold, belief, point, left_m, predicted.closing, outlook)
-        twist, speed = self._controller.command(situation, pose.yaw)
-        self._asked = self._smoothed(twist)
-        return self._plan(scene, told, situation, outlook, speed)
-
-    def _smoothed(self, twist: BodyTwist) -> BodyTwist:
-        """Return the twist a share of the way from the one asked before."""
-        last, share = self._asked, self._share
-        return BodyTwist(last.vx + share * (twist.vx - last.vx), last.vy + share * (twist.vy - last.vy), twist.wz)
+        around = Around(scene.ground, belief.clearance.known, self._solver.least_m, self._settings.controller.body_m)
+        twist, speed = self._controller.command(situation, pose.yaw, around)
+        return self._plan(scene, told, situation, outlook, (twist, speed))
 
     def _wait(self, belief: Belief, reason: str, *, blocked: bool) -> Plan:
         """Stand; where the way is blocked, look whether it still is."""
         self._tracker.reset()
         self._lookout.reset()
-        self._asked = BodyTwist()
+        self._controller.reset()
         diagnostics = ManifoldDiagnostics(fallback_category="", stopped=reason)
         if not blocked or self._chart is None:
             self._chart = None
@@ -194,9 +189,9 @@ class ClearanceManifold:
         along_m_s = max(0.0, float(velocity @ told.manifold.tangent()))
         return self._lookout.watch(seen, way, normal, along_m_s, self._setup.period_s)
 
-    def _plan(self, scene: Scene, told: Continuation, at: Situation, outlook: Outlook, speed: float) -> Plan:
-        s, manifold = self._settings, told.manifold
-        stops = speed <= brakable(at.free_m, s.controller.deceleration_m_s2, s.controller.delay_s) + 1e-9
+    def _plan(self, scene: Scene, told: Continuation, at: Situation, outlook: Outlook, command: tuple[BodyTwist, float]) -> Plan:
+        s, manifold, (twist, speed) = self._settings, told.manifold, command
+        stops = speed <= brakable(min(at.free_m, at.clear_m), s.controller.deceleration_m_s2, s.controller.delay_s) + 1e-9
         gain = s.controller.lateral_gain_per_s
         held = check(
             told, least_m=self._solver.least_m, lipschitz_m_s=s.tracker.lipschitz_m_s,
@@ -205,7 +200,7 @@ class ClearanceManifold:
         self._ticks += (int(told.category is Category.NONE), 1)
         said = diagnose(told, at, held, outlook, speed, gain, float(self._ticks[0] / self._ticks[1]))
         drawings = drawn(scene, manifold, self._tracker.tube_m, at.closing, outlook.look_at)
-        return Plan(self._asked, path_in_odom=manifold.points[manifold.ahead], diagnostics=said, drawings=drawings)
+        return Plan(twist, path_in_odom=manifold.points[manifold.ahead], diagnostics=said, drawings=drawings)
 
     def snapshot(self) -> bytes:
         """Return the whole state."""
@@ -215,11 +210,11 @@ class ClearanceManifold:
             goal=np.zeros(2) if chart is None else chart.goal,
             arc_m=self._arc_m,
             ticks=self._ticks,
-            asked=(self._asked.vx, self._asked.vy, self._asked.wz),
             **self._field.state(),
             **self._tracker.state(),
             **self._waiting.state(),
             **self._lookout.state(),
+            **self._controller.state(),
         )
 
     def restore(self, snapshot: bytes) -> None:
@@ -227,8 +222,8 @@ class ClearanceManifold:
         state = unpack(snapshot)
         self._chart = Chart(state["line"], state["goal"]) if len(state["line"]) else None
         self._arc_m, self._ticks = float(state["arc_m"]), state["ticks"]
-        self._asked = BodyTwist(*state["asked"].tolist())
         self._field.take(state)
         self._tracker.take(state)
         self._waiting.take(state)
         self._lookout.take(state)
+        self._controller.take(state)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from drivers.interface.geometry import wrap_angle
+from drivers.interface.geometry import SE2, wrap_angle
 from estimators.belief import F64, Belief
 from estimators.field_query import sample
 from planners.clearance_manifold.control_kernels import known_length
@@ -53,17 +53,20 @@ class Reader:
             ridge_clearance_m=float(near.min()) if near.size else 0.0,
             margin_m=float(clearance.min()) - self._least_m if clearance.size else 0.0,
             commitment=self._commitment(manifold, belief),
-            free_m=min(self._free_length(manifold, belief, left_m), outlook.free_m),
+            free_m=self._free_length(manifold, belief, left_m),
+            clear_m=outlook.free_m,
             most_m_s=outlook.speed_m_s,
             heading_rad=self._look(along_rad, closing, point, outlook.look_at),
             feasible=manifold.valid > 1,
             robot=point,
+            velocity=SE2(0.0, 0.0, belief.odom_from_base.yaw).apply(np.array([belief.twist.vx, belief.twist.vy])),
             closing=closing,
         )
 
     def _look(self, along_rad: float, closing: F64, point: F64, look_at: F64 | None) -> float:
         """Return where to look: along the manifold, but turned as far as it takes to keep in view what closes in, or may."""
-        s, watched = self._settings, closing[:2] if closing[4] > 0.0 else look_at
+        comes = closing[4] > 0.0 and float((closing[:2] - point) @ closing[2:4]) < 0.0  # who has passed is not looked after
+        s, watched = self._settings, closing[:2] if comes else look_at
         if watched is None:
             return along_rad
         room_rad = math.radians(max(0.0, 0.5 * s.prediction.fov_deg - s.controller.view_margin_deg))

@@ -97,7 +97,6 @@ class ControllerSettings(Settings):
     heading_look_ahead_m: float = Field(
         default=1.0, gt=0.0, le=10.0, description="the heading is that of the manifold up to here"
     )
-    smoothing_s: float = Field(default=0.0, ge=0.0, le=2.0, description="time constant of the velocity asked")
     yield_m: float = Field(
         default=0.60, ge=0.0, le=3.0, description="between the robot and the middle of what closes in; 0: it does not yield"
     )
@@ -110,6 +109,21 @@ class ControllerSettings(Settings):
     arrival_m: float = Field(default=0.05, gt=0.0, le=1.0, description="this near the goal it stands")
     look_ahead_m: float = Field(
         default=0.2, gt=0.01, le=2.0, description="of a base that cannot strafe: the point that is controlled"
+    )
+
+
+class SmoothnessSettings(Settings):
+    """How the velocity asked follows the one wanted; of a base that can strafe."""
+
+    enabled: bool = Field(default=True, description="off: it is asked for at once, as in the paper")
+    jerk_m_s3: float = Field(default=0.8, gt=0.0, le=1000.0, description="used while nothing presses")
+    urgent_m_s3: float = Field(default=8.0, gt=0.0, le=1000.0, description="used at most, to stop in time or let somebody pass")
+    watchful_m_s3: float = Field(
+        default=2.0, gt=0.0, le=1000.0, description="used at most to stop before an opening that the look-out finds late"
+    )
+    response_per_s: float = Field(default=6.0, gt=0.0, le=100.0, description="of small differences: faster noise is damped")
+    slip_m_s: float = Field(
+        default=0.2, gt=0.0, le=2.0, description="the base does something else (a shield) if it differs by this: go on from there"
     )
 
 
@@ -146,5 +160,6 @@ class ClearanceManifoldSettings(Settings):
     solver: SolverSettings = SolverSettings()
     tracker: TrackerSettings = TrackerSettings()
     controller: ControllerSettings = ControllerSettings()
+    smoothness: SmoothnessSettings = SmoothnessSettings()
     lookout: LookoutSettings = LookoutSettings()
     waiting: WaitingSettings = WaitingSettings()

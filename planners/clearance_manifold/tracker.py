@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from drivers.interface.geometry import SE2
 from estimators.belief import F64, Belief
 from planners.clearance_manifold.chart import Chart
+from planners.clearance_manifold.drift import Drift, Past
 from planners.clearance_manifold.extraction import Prior, Scene, Solver
 from planners.clearance_manifold.manifold import Manifold, Stations, points_of
 from planners.clearance_manifold.ridge_kernels import along_manifold
@@ -41,7 +42,8 @@ class Continuation:
     category: Category
     trigger: str  # what ended the continuation, in a word or two
     deviation_m: float  # M2: largest distance between the two manifolds at the same station; 0 without one before
-    normal_speed_m_s: float  # v_gamma of definition 1
+    normal_speed_m_s: float  # v_gamma of definition 1, from tick to tick
+    drift_m_s: float  # the same over the paper's step of 0.2 s, which P4 bounds
     same_branch: bool  # P3
     converged: bool
 
@@ -54,12 +56,13 @@ class Tracker:
     ) -> None:
         """Start with no manifold."""
         self._settings, self._solver_settings, self._solver, self._stations = settings, solver_settings, solver, stations
-        self._period_s = period_s
+        self._period_s, self._drift = period_s, Drift()
         self._step_limit_m = settings.step_share * solver_settings.horizon_m / solver_settings.stations_forward
         self.reset()
 
     def reset(self) -> None:
         """Forget the manifold."""
+        self._drift.reset()
         self._points: F64 = np.zeros((0, 2))
         self._arcs_m: F64 = np.zeros(0)
         self._offset_m: F64 = np.zeros(0)
@@ -81,7 +84,8 @@ class Tracker:
         return len(self._arcs_m) > 0
 
     def rechart(self, chart: Chart) -> None:
-        """Express the manifold on another chart."""
+        """Express the manifold, and those before it, on another chart."""
+        self._drift.rechart(chart)
         if not self.holds:
             return
         on_chart = chart.project(self._points)
@@ -105,9 +109,10 @@ class Tracker:
             manifold = self._solver.extract(scene, keep)
             duals = np.zeros(len(scene.arcs_m))
             self._looked_ns = belief.stamp_ns
-        told = self._compare(scene, manifold, prior, elapsed_s)
+        deviation_m, speed_m_s, same = self._compare(scene, manifold, prior, elapsed_s)
+        drift_m_s = self._drift.speed(belief.stamp_ns, scene.arcs_m[manifold.ahead], manifold.offset_m[manifold.ahead])
         self._keep(scene, manifold, duals, belief)
-        return Continuation(manifold, category, trigger, *told, converged)
+        return Continuation(manifold, category, trigger, deviation_m, speed_m_s, drift_m_s, same, converged)
 
     def _broken(self, scene: Scene, belief: Belief, new_goal: bool, prior: Prior | None) -> tuple[Category, str]:
         """Return what forbids to continue before it is tried."""
@@ -165,6 +170,7 @@ class Tracker:
         self._points, self._arcs_m, self._offset_m, self._duals = manifold.points, manifold.arcs_m, manifold.offset_m, duals
         self._robot, self._point, self._stamp_ns = belief.odom_from_base, scene.robot, belief.stamp_ns
         self._lateral_m = float(scene.robot_m - manifold.offset_m[self._stations.own])
+        self._drift.keep(Past(belief.stamp_ns, manifold.points, manifold.arcs_m, manifold.offset_m))
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Return what is carried on, as named arrays."""
@@ -176,6 +182,7 @@ class Tracker:
             "duals": self._duals,
             "robot": np.array([robot.x, robot.y, robot.yaw, self._lateral_m, *self._point]),
             "stamps_ns": np.array([self._stamp_ns, self._looked_ns], np.int64),
+            **self._drift.state(),
         }
 
     def take(self, state: dict[str, NDArray[Any]]) -> None:
@@ -186,6 +193,7 @@ class Tracker:
         self._point = np.array(point)
         self._robot = SE2(x, y, yaw)
         self._stamp_ns, self._looked_ns = (int(stamp) for stamp in state["stamps_ns"])
+        self._drift.take(state)
 
 
 def heading(points: F64) -> float:

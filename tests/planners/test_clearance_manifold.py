@@ -159,6 +159,7 @@ def test_stands_where_there_is_no_safe_way(limits, belief, goal, reason):
     plan = planner.plan(*routed(belief, goal))
     assert plan.base.finite
     assert plan.base.vx <= 0.02
+    assert plan.diagnostics.speed_m_s <= 0.02
     assert plan.diagnostics.p6
     assert reason in plan.diagnostics.stopped
 
@@ -183,19 +184,22 @@ def test_turns_to_a_goal_behind_before_it_drives_into_what_it_has_not_seen(limit
 
 
 def test_an_empty_grid_is_no_obstacle():
-    planner = planner_of()
-    for tick in range(12):
-        plan = planner.plan(*routed(at(tick, ())))
+    planner, twist = planner_of(), BodyTwist()
+    for tick in range(40):
+        plan = planner.plan(*routed(at(tick, (), twist=twist)))
+        twist = plan.base
     assert plan.base.vx > 0.45
     assert plan.diagnostics.p1
 
 
 def test_gives_way_behind_who_crosses_instead_of_driving_in_front():
     """A walker crosses from the right, well ahead: standing would let him pass; going left would meet him."""
-    crossing = Disc(1.3, -0.8, 0.25, -0.6, 0.6)
-    yields, stubborn = planner_of(), planner_of(controller={"yield_m": 0.0})
+    crossing = Disc(1.57, -1.07, 0.25, -0.6, 0.6)  # at the tenth tick at (1.3, -0.8)
+    at_once = {"enabled": False}
+    yields, stubborn = planner_of(smoothness=at_once), planner_of(smoothness=at_once, controller={"yield_m": 0.0})
     asked = [
-        [planner.plan(*routed(at(tick, (*WALLS, crossing)))).base for tick in range(10)][-1] for planner in (yields, stubborn)
+        [planner.plan(*routed(at(tick, (*WALLS, crossing.at(tick * PERIOD_S))))).base for tick in range(10)][-1]
+        for planner in (yields, stubborn)
     ]
     assert (
         asked[0].vx + asked[0].vy < 0.0 < asked[1].vx + asked[1].vy
