@@ -43,7 +43,7 @@ class Filtered:
     """What the shield made of a command."""
 
     command: Command
-    intervened: bool = False
+    intervened: bool = False  # it sends another twist than the nearest that can be reached to the one asked
     diagnostics: Diagnostics = field(default_factory=Diagnostics)
     drawings: tuple[Drawing, ...] = ()
 
@@ -67,5 +67,9 @@ class Shield(Stateful, Protocol):
         ...
 
     def filter(self, command: Command, belief: Belief, reachable: ReachableSet) -> Filtered:
-        """Return the safest command near the asked one whose twist lies in `reachable`."""
+        """Return the safest command near the asked one whose twist lies in `reachable`.
+
+        Asked is what the planner wants in the end, reachable or not: who asks to stand brakes until he stands, and a forecast of
+        it is not one of the speed that he has after this tick.
+        """
         ...

@@ -65,8 +65,9 @@ class Supervisor:
         faults = self._diagnosis.faults(plan, belief, sensed, self._operator)
         self._resume_from(belief, sensed)
         reachable = self._reachable(worst(faults))
-        asked = self._asked(plan, belief, sensed, reachable)
-        filtered = self._shielded(asked, belief, reachable, faults)
+        wanted = self._wanted(plan, belief, sensed)
+        asked = wanted if wanted.base is None else replace(wanted, base=reachable.clip(wanted.base))
+        filtered = self._shielded(wanted, belief, reachable, faults)
         command = self._slowed(self._responding(worst(faults), asked, filtered, sensed), worst(faults))
         command = self._checked(command, sensed, faults)
         self._remember(command)
@@ -93,7 +94,8 @@ class Supervisor:
         factor = self._settings.slow_factor if response is Response.DECELERATE else 1.0
         return self._limiter.reachable(self._motion, factor)
 
-    def _asked(self, plan: Plan, belief: Belief, sensed: Sensed, reachable: ReachableSet) -> Command:
+    def _wanted(self, plan: Plan, belief: Belief, sensed: Sensed) -> Command:
+        """Return what the planner wants in the end: a shield has to know that it brakes, not how far it gets in this tick."""
         twist, arm = plan.base, plan.arm
         if self._operator.jog is not None:  # who drives by hand has the base to himself
             twist, arm = self._operator.jog.twist, None
@@ -104,13 +106,13 @@ class Supervisor:
         expires_ns = sensed.tick.start_ns + round(self._settings.command_lifetime_s * SECOND_NS)
         if self._arm_at_rest is None or arm is None:
             arm = self._arm_at_rest
-        return Command(None if twist is None else reachable.clip(twist), arm, expires_ns, belief.oldest_input_ns)
+        return Command(twist, arm, expires_ns, belief.oldest_input_ns)
 
-    def _shielded(self, asked: Command, belief: Belief, reachable: ReachableSet, faults: list[FaultReport]) -> Filtered | None:
-        if worst(faults) not in {Response.RUN, Response.DECELERATE} or asked.base is None:
+    def _shielded(self, wanted: Command, belief: Belief, reachable: ReachableSet, faults: list[FaultReport]) -> Filtered | None:
+        if worst(faults) not in {Response.RUN, Response.DECELERATE} or wanted.base is None:
             return None
         try:
-            return checked(self._shield.filter(asked, belief, reachable), Filtered)
+            return checked(self._shield.filter(wanted, belief, reachable), Filtered)
         except Exception as error:  # noqa: BLE001 - a shield is anyone's code; its failure must stop the robot, not the loop
             faults.append(report(error, Fault.SHIELD_RAISED, "shield"))
             return None

@@ -120,7 +120,7 @@ class FieldCbf:
         """
         if command.base is None:
             return Filtered(command)
-        asked = command.base if command.base.finite else BodyTwist()
+        asked = reachable.clip(command.base if command.base.finite else BodyTwist())
         low, high = reachable.lowest, reachable.highest
         box = Asked(np.array([asked.vx, asked.vy]), np.array([low.vx, low.vy]), np.array([high.vx, high.vy]))
         found = self._filtered(belief, box, self._barrier)
@@ -136,7 +136,7 @@ class FieldCbf:
             found.enclosed,
         )
         drawn = Drawing("boundaries", found.boundaries, False), Drawing("constraints", found.constraining, False)
-        return Filtered(replace(command, base=twist), twist != command.base, said, drawn)
+        return Filtered(replace(command, base=twist), twist != reachable.clip(command.base), said, drawn)
 
     def snapshot(self) -> bytes:
         """Return nothing: it has no state."""

@@ -90,7 +90,7 @@ class LatticeShield:
         """Return the command with its twist filtered into `reachable`; one that is not finite counts as a stop."""
         if command.base is None:
             return Filtered(command)
-        asked = reachable.clip(command.base if command.base.finite else BodyTwist())
+        asked = command.base if command.base.finite else BodyTwist()
         twists = self._candidates(asked)
         least, end, here = self._forecast(belief, twists)
         violation = self._violation(least, here)
@@ -101,7 +101,7 @@ class LatticeShield:
             int(feasible.sum()), bool(feasible[0]), here, float(least[chosen]), here < 0.0, not bool(feasible.any())
         )
         drawings = (Drawing("asked", end[:1], connected=False), Drawing("sent", end[[chosen]], connected=False))
-        return Filtered(replace(command, base=twist), twist != command.base, said, drawings)
+        return Filtered(replace(command, base=twist), twist != reachable.clip(command.base), said, drawings)
 
     def snapshot(self) -> bytes:
         """Return nothing: it has no state."""

@@ -32,7 +32,7 @@ class NoShield:
         if command.base is None:
             return Filtered(command)
         twist = reachable.clip(command.base if command.base.finite else BodyTwist())
-        return Filtered(replace(command, base=twist), intervened=twist != command.base)
+        return Filtered(replace(command, base=twist), intervened=twist != reachable.clip(command.base))
 
     def snapshot(self) -> bytes:
         """Return nothing: it has no state."""

@@ -187,7 +187,7 @@ def drive(
         belief = belief_of(world, pose, twist, tick=tick, seen_m=seen_m, fov_rad=fov_rad)
         plan = planner.plan(belief, router.route(belief, mission))
         reachable = reachable_from(twist, limits, period_s)
-        filtered = shield.filter(command_of(reachable.clip(plan.base)), belief, reachable)
+        filtered = shield.filter(command_of(plan.base), belief, reachable)
         trace.plans.append(plan)
         trace.filtered.append(filtered)
         twist = filtered.command.base

@@ -51,6 +51,14 @@ def test_it_brakes_or_turns_before_a_wall(limits):
     assert result.command.base.vx < 0.5
 
 
+def test_who_wants_to_stop_may_although_what_he_gets_to_in_a_tick_would_not_do():
+    """The wall is 0.45 m off: the speed that is left after one tick, kept up, leads into it; braking on does not."""
+    result = filtered([Box(RADIUS_M + 0.45, -3, 3.0, 3)], asked=BodyTwist())
+    assert result.diagnostics.asked_feasible
+    assert not result.intervened
+    assert result.command.base == reachable_from(AHEAD, DIFFERENTIAL, PERIOD_S).clip(BodyTwist())
+
+
 def test_it_sees_by_its_velocity_who_will_be_in_the_way():
     assert filtered([], tracks=(coming(1.6, 0.5),)).diagnostics.asked_feasible
     assert not filtered([], tracks=(coming(1.6, -0.8),)).diagnostics.asked_feasible

@@ -14,7 +14,7 @@ from drivers.interface.samples import EmergencyStop, Jog, ResetFaults, SetEnable
 from drivers.interface.sensed import Sensed, Tick
 from estimators.belief import EstimatorFault
 from planners.planner import Plan
-from planners.shield import Filtered
+from planners.shield import Filtered, ReachableSet
 from runtime.cycle import Verdict
 from runtime.diagnosis import ladder_rung
 from runtime.fault_board import FaultBoard
@@ -27,15 +27,16 @@ FORWARD = Plan(base=BodyTwist(0.6, 0.0, 0.0))
 
 
 class Passing:
-    """A shield that changes nothing, or raises, or asks for the impossible."""
+    """A shield that sends what can be reached of what is asked, or raises, or asks for the impossible."""
 
     def __init__(self, raising: bool = False, twist: BodyTwist | None = None) -> None:
         self.raising, self.twist = raising, twist
 
-    def filter(self, command: Command, belief: object, reachable: object) -> Filtered:
+    def filter(self, command: Command, belief: object, reachable: ReachableSet) -> Filtered:
         if self.raising:
             raise ZeroDivisionError("division by zero")
-        return Filtered(command if self.twist is None else replace(command, base=self.twist))
+        twist = reachable.clip(command.base) if self.twist is None else self.twist
+        return Filtered(replace(command, base=twist))
 
 
 def supervisor(
