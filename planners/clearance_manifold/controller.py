@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +12,7 @@ from drivers.interface.commands import BaseLimits, BodyTwist
 from drivers.interface.geometry import SE2, wrap_angle
 from estimators.belief import F64
 from planners.clearance_manifold.control_kernels import brakable, give_way, longitudinal
+from planners.clearance_manifold.differential import Differential
 from planners.clearance_manifold.governor import Around, Governor, Motion, approach
 from planners.clearance_manifold.governor_kernels import time_to_pass
 from planners.clearance_manifold.settings import ControllerSettings
@@ -21,7 +21,6 @@ from planners.point_ds.kernels import within
 LEAD_S = 0.4  # the robot is out of the way so long before somebody passes: he is as wide as he is, and so is it
 NEAR_M = 1.0  # who passes at more than this does not press
 APPROACH = 0.25  # of the jerk, on the way to the manifold: the rest is left for what else happens
-STANDSTILL_M_S = 0.01  # a base that cannot strafe turns on the spot below this
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,14 +40,17 @@ class Situation:
     robot: F64  # (2,), the point that is controlled, in odom
     velocity: F64  # (2,), of the base, in odom
     closing: F64  # (5,), what closes in
+    behind_m: float = 0.0  # how far a base that cannot strafe may back off
 
 
 class ManifoldController:
     """Turns a situation into a body twist."""
 
-    def __init__(self, settings: ControllerSettings, limits: BaseLimits, governor: Governor) -> None:
-        """Take the gains, the limits and what smooths the velocity, which is carried on with this one's state."""
+    def __init__(self, settings: ControllerSettings, limits: BaseLimits, governor: Governor, radius_m: float) -> None:
+        """Take gains, limits and radius, and what smooths the velocity, which is carried on with this one's state."""
         self._settings, self._limits, self._governor = settings, limits, governor
+        self._differential = Differential(settings, limits)
+        self._apart_m = radius_m + settings.yield_m if settings.yield_m > 0.0 else 0.0
         self._hand = 0.0  # on which who comes passes
         self._delay_s = settings.delay_s
         if limits.holonomic and governor.enabled:  # braking begins with a ramp
@@ -73,8 +75,10 @@ class ManifoldController:
         if at.feasible and speed + float(push @ tangent) < self._settings.progress_m_s:
             speed = min(self._settings.progress_m_s, self._brakable(min(at.free_m, at.clear_m)))
         if not self._limits.holonomic:
-            u = body.apply(self._yielding(body.inverse().apply(push + speed * tangent), at))
-            return self._look_ahead_twist(u, speed, self.turn(at, yaw)), speed
+            along = body.inverse().apply(push + speed * tangent)
+            u = self._yielding(along, at)
+            behind_m = at.behind_m if np.any(u != along) else 0.0  # only who gives way backs off
+            return self._differential.twist(body.apply(u), speed, wrap_angle(at.heading_rad - yaw), behind_m), speed
         low_x = -cap.vx if self._limits.reverse else -1e-9
         push_x, push_y = within(float(push[0]), float(push[1]), low_x, cap.vx, cap.vy)
         k = longitudinal(push_x, push_y, float(tangent[0]), float(tangent[1]), speed, cap.vx, cap.vy, min(low_x, 0.0))
@@ -86,7 +90,9 @@ class ManifoldController:
     def _push(self, error: F64, jerk_m_s3: float) -> F64:
         """Return equation 4's velocity towards the manifold, shape (2,), in odom, if it can still end there with that jerk."""
         error_m, gain_per_s = float(np.hypot(*error)), self._settings.lateral_gain_per_s
-        if not self._limits.holonomic or not self._governor.enabled or error_m < 1e-9:
+        if not self._limits.holonomic:
+            return self._differential.push(error)
+        if not self._governor.enabled or error_m < 1e-9:
             return np.asarray(-gain_per_s * error)
         speed = min(gain_per_s * error_m, approach(error_m, APPROACH * jerk_m_s3))
         return np.asarray(-speed / error_m * error)
@@ -108,7 +114,7 @@ class ManifoldController:
         error_m = float(np.hypot(*at.error))
         side = -at.error / error_m if error_m > 1e-6 else np.array([-at.tangent[1], at.tangent[0]])
         yielding: F64
-        yielding, self._hand = give_way(u, at.robot, at.closing, s.yield_m, s.yield_horizon_s, side, at.tangent, self._hand)
+        yielding, self._hand = give_way(u, at.robot, at.closing, self._apart_m, s.yield_horizon_s, side, at.tangent, self._hand)
         return yielding
 
     def reset(self) -> None:
@@ -129,17 +135,3 @@ class ManifoldController:
         """Return wz towards the heading wanted."""
         cap = self._limits.velocity.wz
         return min(max(self._settings.heading_gain_per_s * wrap_angle(at.heading_rad - yaw), -cap), cap)
-
-    def _look_ahead_twist(self, u: F64, speed: float, turn: float) -> BodyTwist:
-        """Return the twist that moves the point `look_ahead_m` ahead with velocity u, shape (2,), in the body frame.
-
-        Feedback linearisation: v = u_x, w = u_y / d.  What does not point ahead is turned to on the spot; with no speed along
-        the manifold, `turn` says where to look meanwhile.
-        """
-        cap, d = self._limits.velocity, self._settings.look_ahead_m
-        if u[0] <= STANDSTILL_M_S:
-            if speed > STANDSTILL_M_S:  # it is to go there, whatever it would look at
-                turn = min(max(self._settings.heading_gain_per_s * math.atan2(u[1], u[0]), -cap.wz), cap.wz)
-            return BodyTwist(0.0, 0.0, turn)
-        vx, wz_d = within(float(u[0]), float(u[1]), -cap.vx, cap.vx, cap.wz * d)
-        return BodyTwist(vx, 0.0, wz_d / d)

@@ -59,10 +59,10 @@ class ClearanceManifold:
         self._field = ArrivalField(settings.prediction)
         self._solver = Solver(settings.solver, settings.tracker, self._stations, setup)
         self._tracker = Tracker(settings.tracker, settings.solver, self._solver, self._stations, setup.period_s)
-        self._reader = Reader(settings, self._stations, self._solver.least_m)
+        self._reader = Reader(settings, self._stations, self._solver.least_m, strafes=setup.limits.holonomic)
         self._lookout = Lookout(settings.lookout, setup.limits, setup.robot_radius_m, settings.controller.speed_m_s)
         self._governor = Governor(settings.smoothness, setup.limits, setup.period_s)
-        self._controller = ManifoldController(settings.controller, setup.limits, self._governor)
+        self._controller = ManifoldController(settings.controller, setup.limits, self._governor, setup.robot_radius_m)
         self._waiting = Waiting(settings.waiting, setup.limits.velocity.wz)
         self._chart: Chart | None = None
         self._arc_m = 0.0  # of the robot on the chart

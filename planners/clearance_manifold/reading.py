@@ -17,15 +17,16 @@ from planners.clearance_manifold.settings import ClearanceManifoldSettings
 from planners.clearance_manifold.tracker import heading
 
 LOOK_AT_MOST_DEG = 120.0  # what closes in from behind is not turned to
+BEHIND_M = 1.0  # so far back is looked for room to back off
 UNKNOWN_GAP_M = 0.15  # shorter stretches of unknown cells are holes in a depth image, not the edge of what was seen
 
 
 class Reader:
     """Projects the robot onto a manifold."""
 
-    def __init__(self, settings: ClearanceManifoldSettings, stations: Stations, least_m: float) -> None:
-        """Take the settings, where the stations stand, and rho_min."""
-        self._settings, self._stations, self._least_m = settings, stations, least_m
+    def __init__(self, settings: ClearanceManifoldSettings, stations: Stations, least_m: float, *, strafes: bool) -> None:
+        """Take the settings, where the stations stand, rho_min, and whether the base can move while it looks aside."""
+        self._settings, self._stations, self._least_m, self._strafes = settings, stations, least_m, strafes
 
     def situation(
         self, manifold: Manifold, belief: Belief, point: F64, left_m: float, closing: F64, outlook: Outlook
@@ -61,7 +62,19 @@ class Reader:
             robot=point,
             velocity=SE2(0.0, 0.0, belief.odom_from_base.yaw).apply(np.array([belief.twist.vx, belief.twist.vy])),
             closing=closing,
+            behind_m=0.0 if self._strafes else self._behind(belief),
         )
+
+    def _behind(self, belief: Belief) -> float:
+        """Return how far straight back the way is known and wide enough [m]."""
+        pose, field = belief.odom_from_base, belief.clearance
+        back = np.array([math.cos(pose.yaw), math.sin(pose.yaw)])
+        points = np.array([pose.x, pose.y]) - np.arange(0.0, BEHIND_M, 0.5 * field.lattice.cell_m)[:, None] * back
+        corner = np.array([field.lattice.x_m, field.lattice.y_m])
+        known_m = known_length(field.known, corner, field.lattice.cell_m, points, self._settings.controller.body_m, UNKNOWN_GAP_M)
+        short = np.flatnonzero(sample(field.clearance_m, field.lattice, points) < self._least_m)
+        wide_m = BEHIND_M if not short.size else 0.5 * field.lattice.cell_m * float(short[0])
+        return float(max(0.0, min(wide_m, known_m - self._settings.controller.body_m)))
 
     def _look(self, along_rad: float, closing: F64, point: F64, look_at: F64 | None) -> float:
         """Return where to look: along the manifold, but turned as far as it takes to keep in view what closes in, or may."""
@@ -69,7 +82,9 @@ class Reader:
         s, watched = self._settings, closing[:2] if comes else look_at
         if watched is None:
             return along_rad
-        room_rad = math.radians(max(0.0, 0.5 * s.prediction.fov_deg - s.controller.view_margin_deg))
+        turns_for_it = look_at is watched and not self._strafes  # it stands meanwhile: no degree more than it takes
+        margin_deg = s.controller.look_margin_deg if turns_for_it else s.controller.view_margin_deg
+        room_rad = math.radians(max(0.0, 0.5 * s.prediction.fov_deg - margin_deg))
         off_rad = wrap_angle(math.atan2(watched[1] - point[1], watched[0] - point[0]) - along_rad)
         if abs(off_rad) > math.radians(LOOK_AT_MOST_DEG):
             return along_rad

@@ -98,7 +98,10 @@ class ControllerSettings(Settings):
         default=1.0, gt=0.0, le=10.0, description="the heading is that of the manifold up to here"
     )
     yield_m: float = Field(
-        default=0.60, ge=0.0, le=3.0, description="between the robot and the middle of what closes in; 0: it does not yield"
+        default=0.48,
+        ge=0.0,
+        le=3.0,
+        description="between the robot's edge and the middle of what closes in; 0: it does not yield",
     )
     yield_horizon_s: float = Field(default=2.5, gt=0.0, le=10.0, description="later encounters are not yielded to")
     view_margin_deg: float = Field(
@@ -109,6 +112,16 @@ class ControllerSettings(Settings):
     arrival_m: float = Field(default=0.05, gt=0.0, le=1.0, description="this near the goal it stands")
     look_ahead_m: float = Field(
         default=0.2, gt=0.01, le=2.0, description="of a base that cannot strafe: the point that is controlled"
+    )
+    turn_share: float = Field(
+        default=0.7,
+        gt=0.0,
+        le=1.0,
+        description="of a base that cannot strafe: share of its angular acceleration that turns count on",
+    )
+    turn_delay_s: float = Field(default=0.2, ge=0.0, le=2.0, description="of it too: from what is asked to how it turns")
+    look_margin_deg: float = Field(
+        default=10.0, ge=0.0, le=90.0, description="of it too: what it stands and looks for is so far inside the edge of view"
     )
 
 

@@ -1,0 +1,75 @@
+"""A base that cannot strafe under the clearance manifold: how it turns, drives to a point beside it, and backs off."""
+
+import math
+
+import numpy as np
+import pytest
+
+from drivers.interface.commands import BaseLimits, BodyTwist
+from drivers.interface.geometry import SE2
+from planners.clearance_manifold.differential import Differential
+from planners.clearance_manifold.settings import ControllerSettings
+
+PERIOD_S, LAG_S, TURN_RAD_S2 = 0.05, 0.06, 3.0
+LIMITS = BaseLimits(
+    BodyTwist(1.0, 0.0, 2.0), BodyTwist(1.5, 0.0, TURN_RAD_S2), BodyTwist(15.0, 0.0, 30.0), BodyTwist(2.0, 0.0, 6.0)
+)
+SETTINGS = ControllerSettings()
+
+
+class Base:
+    """Follows what was asked a tick ago: turns up at TURN_RAD_S2, with a lag."""
+
+    def __init__(self, pose):
+        self.pose, self.last, self.set_rad_s, self.turn_rad_s = pose, BodyTwist(), 0.0, 0.0
+
+    def step(self, asked):
+        most = TURN_RAD_S2 * PERIOD_S
+        self.set_rad_s += min(max(self.last.wz - self.set_rad_s, -most), most)
+        self.turn_rad_s += (self.set_rad_s - self.turn_rad_s) * (1.0 - math.exp(-PERIOD_S / LAG_S))
+        self.pose = self.pose.integrate(self.last.vx, 0.0, self.turn_rad_s, PERIOD_S)
+        self.last = asked
+
+
+@pytest.mark.parametrize("off_rad", [0.05, 0.4, -1.4, 3.0])
+def test_a_turn_on_the_spot_ends_where_it_should_without_swinging(off_rad):
+    base, differential, headings = Base(SE2()), Differential(SETTINGS, LIMITS), []
+    for _ in range(80):
+        base.step(BodyTwist(0.0, 0.0, differential.turn_to(math.remainder(off_rad - base.pose.yaw, math.tau))))
+        headings.append(base.pose.yaw)
+    assert headings[-1] == pytest.approx(off_rad, abs=0.01)
+    assert np.max(np.abs(headings)) < abs(off_rad) + 0.05
+    quickest_s = 2.0 * math.sqrt(abs(off_rad) / TURN_RAD_S2)  # without a limit on the rate: speeding up, then braking
+    assert np.argmax(np.abs(np.array(headings) - off_rad) < 0.1) * PERIOD_S < 1.6 * quickest_s + 0.5
+
+
+@pytest.mark.parametrize("start", [SE2(0.0, 0.4, 0.0), SE2(0.0, -0.2, 0.7), SE2(0.0, 0.0, 1.3)])
+def test_a_line_is_joined_without_swinging_about_it(start):
+    """What it asks must not be more than a base that turns up slowly can take back in time."""
+    base, differential, found = Base(start), Differential(SETTINGS, LIMITS), []
+    for _ in range(200):
+        pose = base.pose
+        point_y = pose.y + SETTINGS.look_ahead_m * math.sin(pose.yaw)
+        velocity = np.array([0.5, 0.0]) + differential.push(np.array([0.0, point_y]))
+        base.step(differential.twist(SE2(0.0, 0.0, -pose.yaw).apply(velocity), 0.5, 0.0, 0.0))
+        found.append((pose.x, pose.y, pose.yaw))
+    x, y, yaw = np.array(found).T
+    assert np.abs(y[100:]).max() < 0.02
+    assert np.abs(yaw[100:]).max() < 0.05
+    assert (np.diff(np.sign(yaw[20:])) != 0).sum() <= 3
+    assert x[-1] > 4.0  # 0.5 m/s for 10 s, less what joining takes
+
+
+def test_pushed_back_it_backs_off_as_far_as_there_is_room_and_else_turns():
+    differential, back = Differential(SETTINGS, LIMITS), np.array([-0.4, 0.1])
+    assert differential.twist(back, 0.5, 0.0, 1.0) == BodyTwist(-0.4, 0.0, 0.0)
+    near = differential.twist(back, 0.5, 0.0, 0.02)
+    assert -0.2 < near.vx < 0.0
+    assert near.vx**2 / (2.0 * SETTINGS.deceleration_m_s2) < 0.02
+    turning = differential.twist(back, 0.5, 0.0, 0.0)
+    assert turning.vx == 0.0
+    assert turning.wz > 0.5
+
+
+def test_with_no_speed_it_looks_aside():
+    assert Differential(SETTINGS, LIMITS).twist(np.zeros(2), 0.0, -0.8, 1.0).wz < -0.5
