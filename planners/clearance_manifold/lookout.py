@@ -31,6 +31,7 @@ class Outlook:
     look_at: F64 | None = None  # (2,), in odom: what is to be seen first
     demand_m_s: float = 0.0  # the walker who is reckoned with; 0: there is no opening
     waits: bool = False  # an opening is not clear
+    creeps: bool = False  # and the robot is in it already, with nothing seen beside it
 
 
 class Lookout:
@@ -88,7 +89,7 @@ class Lookout:
             if look_at is not None and speed_m_s < s.creep_m_s + 0.05:
                 self._waited_s += 2.0 * period_s if creeps else period_s
             if creeps:
-                return Outlook(math.inf, s.creep_m_s, look_at, demand, True)
+                return Outlook(math.inf, s.creep_m_s, look_at, demand, True, True)
             return Outlook(max(begin, 0.0), math.inf, look_at, demand, True)
         if not len(found):  # an opening that flickers is the same one
             self._waited_s = max(0.0, self._waited_s - period_s)

@@ -17,6 +17,7 @@ from planners.clearance_manifold.settings import ClearanceManifoldSettings
 from planners.clearance_manifold.tracker import heading
 
 LOOK_AT_MOST_DEG = 120.0  # what closes in from behind is not turned to
+TURNED_RAD = 0.1  # nearer than this it has turned
 BEHIND_M = 1.0  # so far back is looked for room to back off
 UNKNOWN_GAP_M = 0.15  # shorter stretches of unknown cells are holes in a depth image, not the edge of what was seen
 
@@ -48,6 +49,8 @@ class Reader:
         near = clearance[manifold.arcs_m[manifold.ahead] <= manifold.arcs_m[own] + s.heading_look_ahead_m]
         look = max(2, int(np.searchsorted(self._stations.arcs_m[own:], s.heading_look_ahead_m)) + 1)
         along_rad = heading(manifold.points[own : own + look])
+        heading_rad = self._look(along_rad, closing, point, outlook.look_at)
+        stands = not self._strafes and self._looks_first(heading_rad, along_rad, belief.odom_from_base.yaw)
         return Situation(
             error=off - float(off @ tangent) * tangent,
             tangent=tangent,
@@ -55,15 +58,19 @@ class Reader:
             margin_m=float(clearance.min()) - self._least_m if clearance.size else 0.0,
             commitment=self._commitment(manifold, belief),
             free_m=self._free_length(manifold, belief, left_m),
-            clear_m=outlook.free_m,
+            clear_m=0.0 if stands and outlook.creeps else outlook.free_m,
             most_m_s=outlook.speed_m_s,
-            heading_rad=self._look(along_rad, closing, point, outlook.look_at),
+            heading_rad=heading_rad,
             feasible=manifold.valid > 1,
             robot=point,
             velocity=SE2(0.0, 0.0, belief.odom_from_base.yaw).apply(np.array([belief.twist.vx, belief.twist.vy])),
             closing=closing,
             behind_m=0.0 if self._strafes else self._behind(belief),
         )
+
+    def _looks_first(self, heading_rad: float, along_rad: float, yaw: float) -> bool:
+        """Return whether there is something to look at aside, and the base has not turned to it yet."""
+        return abs(wrap_angle(heading_rad - along_rad)) > TURNED_RAD and abs(wrap_angle(heading_rad - yaw)) > TURNED_RAD
 
     def _behind(self, belief: Belief) -> float:
         """Return how far straight back the way is known and wide enough [m]."""

@@ -119,7 +119,9 @@ class ControllerSettings(Settings):
         le=1.0,
         description="of a base that cannot strafe: share of its angular acceleration that turns count on",
     )
-    turn_delay_s: float = Field(default=0.2, ge=0.0, le=2.0, description="of it too: from what is asked to how it turns")
+    turn_delay_s: float = Field(
+        default=0.45, gt=0.0, le=2.0, description="of it too: e times what passes from what is asked to how it turns; 1 / gain"
+    )
     look_margin_deg: float = Field(
         default=10.0, ge=0.0, le=90.0, description="of it too: what it stands and looks for is so far inside the edge of view"
     )
