@@ -10,6 +10,7 @@ from estimators.field_query import bilinear
 from planners.clearance_manifold.ridge_kernels import Ground
 
 OVER_M_S = 0.1
+EARLY, HALF = 0.3, 0.5  # shares of the time to an encounter: what is left late costs more jerk than what is done early
 SOONEST_S = 0.3  # nothing is answered faster than the base can
 
 
@@ -61,23 +62,23 @@ def jerk_to_stop(speed: float, distance: float) -> float:
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def jerk_to_pass(change: float, time_s: float) -> float:
-    """Return the jerk that has changed a velocity by `change` after half of the time: 4 change / T^2 in T [m/s^3].
+    """Return the jerk that has changed a velocity by `change` early in the time, in 0.3 of it: 4 change / T^2 in T [m/s^3].
 
-    >>> jerk_to_pass(0.5, 2.0)
-    2.0
+    >>> round(jerk_to_pass(0.36, 2.0), 9)
+    4.0
     """
-    within_s = 0.5 * max(time_s, SOONEST_S)
+    within_s = EARLY * max(time_s, SOONEST_S)
     return 4.0 * change / (within_s * within_s)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def jerk_to_move(distance: float, time_s: float) -> float:
-    """Return the constant jerk that moves a robot at rest by `distance` in three quarters of a time: 6 d / T^3 in T [m/s^3].
+    """Return the constant jerk that moves a robot at rest by `distance` in half of a time: 6 d / T^3 in T [m/s^3].
 
-    >>> round(jerk_to_move(0.5, 2.0), 6)
-    0.888889
+    >>> jerk_to_move(0.5, 2.0)
+    3.0
     """
-    within_s = 0.75 * max(time_s, SOONEST_S)
+    within_s = HALF * max(time_s, SOONEST_S)
     return 6.0 * distance / (within_s * within_s * within_s)
 
 
