@@ -51,6 +51,31 @@ def known_length(known: Mask, corner: F64, cell_m: float, points: F64, body_m: f
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def known_way(
+    known: Mask, corner: F64, cell_m: float, robot: F64, along: F64, radius_m: float, body_m: float, gap_m: float, reach_m: float
+) -> float:
+    """Return how far a robot may go straight on until its body meets ground that was never seen, at most `reach_m` [m].
+
+    Args:
+        known: shape (rows, columns).
+        corner: lower corner of the grid in odom, shape (2,).
+        cell_m: size of a cell.
+        robot: in odom, shape (2,).
+        along: where it goes, shape (2,), unit.
+        radius_m: of the robot.
+        body_m: nearer than this to its centre nothing is looked at, and it is kept from the unknown.
+        gap_m: shorter stretches of unknown cells are holes.
+        reach_m: how far is looked.
+    """
+    free, ray = reach_m, np.empty((2, 2))
+    for side in range(-1, 2):
+        ray[0, 0], ray[0, 1] = robot[0] - side * radius_m * along[1], robot[1] + side * radius_m * along[0]
+        ray[1] = ray[0] + (reach_m + body_m + gap_m) * along
+        free = min(free, known_length(known, corner, cell_m, ray, body_m, gap_m) - body_m)
+    return max(free, 0.0)
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def longitudinal(u_x: float, u_y: float, t_x: float, t_y: float, speed: float, cap_x: float, cap_y: float, low_x: float) -> float:
     """Return the largest k <= speed for which u + k t stays inside the caps; 0 where none above it does."""
     k = speed

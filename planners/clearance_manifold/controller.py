@@ -11,13 +11,16 @@ from numpy.typing import NDArray
 from drivers.interface.commands import BaseLimits, BodyTwist
 from drivers.interface.geometry import SE2, wrap_angle
 from estimators.belief import F64
-from planners.clearance_manifold.control_kernels import brakable, give_way, longitudinal
+from planners.clearance_manifold.control_kernels import brakable, give_way, known_way, longitudinal
 from planners.clearance_manifold.differential import Differential
 from planners.clearance_manifold.governor import Around, Governor, Motion, approach
 from planners.clearance_manifold.governor_kernels import time_to_pass
 from planners.clearance_manifold.settings import ControllerSettings
 from planners.point_ds.kernels import within
 
+UNKNOWN_GAP_M = 0.15  # shorter stretches of unknown cells are holes in a depth image, not the edge of what was seen
+SEEN_AHEAD_M = 0.6  # enough to brake from the caps
+STANDSTILL_M_S = 0.01
 LEAD_S = 0.4  # the robot is out of the way so long before somebody passes: he is as wide as he is, and so is it
 NEAR_M = 1.0  # who passes at more than this does not press
 APPROACH = 0.25  # of the jerk, on the way to the manifold: the rest is left for what else happens
@@ -51,6 +54,7 @@ class ManifoldController:
         self._settings, self._limits, self._governor = settings, limits, governor
         self._differential = Differential(settings, limits)
         self._apart_m = radius_m + settings.yield_m if settings.yield_m > 0.0 else 0.0
+        self._radius_m = radius_m
         self._hand = 0.0  # on which who comes passes
         self._delay_s = settings.delay_s
         if limits.holonomic and governor.enabled:  # braking begins with a ramp
@@ -99,7 +103,7 @@ class ManifoldController:
 
     def _smoothed(self, along: F64, at: Situation, around: Around, least_m_s3: float, pass_s: float) -> F64:
         """Return the velocity to ask for, shape (2,), of that along the manifold, in odom: giving way, and smoothed."""
-        yielding = self._yielding(along, at)
+        yielding = self._over_known_ground(self._yielding(along, at), at, around)
         least_m_s3 = max(least_m_s3, self._governor.to_change(float(np.hypot(*(yielding - along))), pass_s))
         return self._governor.follow(
             yielding, Motion(at.robot, at.velocity, at.tangent, at.free_m, at.clear_m), around, least_m_s3
@@ -130,6 +134,21 @@ class ManifoldController:
         """Take over what `state` gave."""
         self._hand = float(state["hand"])
         self._governor.take(state)
+
+    def _over_known_ground(self, u: F64, at: Situation, around: Around) -> F64:
+        """Return a velocity, shape (2,), in odom, slow enough to be braked before what was never seen.
+
+        The manifold ends there, but who gives way or comes back to it sideways does not go along it: what is behind a pillar
+        that the robot passed, nobody saw.
+        """
+        speed, ground = float(np.hypot(*u)), around.ground
+        if speed < STANDSTILL_M_S:
+            return u
+        corner = np.array([ground.x_m, ground.y_m])
+        free_m = known_way(
+            around.known, corner, ground.cell_m, at.robot, u / speed, self._radius_m, around.body_m, UNKNOWN_GAP_M, SEEN_AHEAD_M
+        )
+        return np.asarray(u * min(1.0, brakable(free_m, self._settings.deceleration_m_s2, self._settings.delay_s) / speed))
 
     def turn(self, at: Situation, yaw: float) -> float:
         """Return wz towards the heading wanted."""

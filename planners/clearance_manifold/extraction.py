@@ -44,7 +44,7 @@ class Scene:
     robot_m: float  # lateral offset of the robot
     robot: F64  # (2,), in odom
     end: int  # stations from here on lie beyond the goal and ask for nothing
-    speed_m_s: float  # that arrivals are expected at
+    speed_m_s: float  # the fastest that the robot arrives with
     closing: F64  # (5,), what closes in (`nearest_closing`)
 
 

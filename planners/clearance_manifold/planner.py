@@ -168,7 +168,7 @@ class ClearanceManifold:
             lateral_m,
             point,
             self._end(chart),
-            predicted.speed_m_s,
+            self._settings.prediction.nominal_speed_m_s,
             predicted.closing,
         )
 

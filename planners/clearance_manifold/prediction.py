@@ -15,6 +15,7 @@ from estimators.memory.rolling import transfer
 from planners.clearance_manifold.closing import ClosingMemory
 from planners.clearance_manifold.distance_kernels import lowered
 from planners.clearance_manifold.prediction_kernels import Arrival, nearest_closing, observe, taken_on_arrival
+from planners.clearance_manifold.recent_rate import RecentRate
 from planners.clearance_manifold.settings import PredictionSettings
 
 NEVER_S = 1e6  # age of what was never in view
@@ -29,7 +30,6 @@ class Predicted:
 
     clearance_m: F32  # (rows, columns), Gamma_pred
     closing: F64  # (5,), of what closes in: middle in odom [m], velocity [m/s], number of cells, 0 where nothing does
-    speed_m_s: float  # that arrivals are expected at
 
 
 class ArrivalField:
@@ -42,6 +42,7 @@ class ArrivalField:
         self._age_s: F32 = np.zeros((0, 0), np.float32)
         self._stamp_ns = 0
         self._closing = ClosingMemory(settings.carry_s)
+        self._recent = RecentRate()
 
     def warm_up(self) -> None:
         """Compile the kernels, on read-only arrays as a belief's are."""
@@ -50,7 +51,7 @@ class ArrivalField:
         observe(age_s, known, np.zeros(2), 1.0, np.zeros(3), 1.0, 1.0, 0.0)
         taken = taken_on_arrival(field, field, age_s, np.zeros(2), 1.0, np.zeros(2), self._arrival(0.0))
         lowered(field, taken, 1.0)
-        nearest_closing(field, field, np.zeros(2), 1.0, np.zeros(2), CLOSING_M_S)
+        nearest_closing(field, field, age_s, np.zeros(2), 1.0, np.zeros(2), CLOSING_M_S)
 
     def update(self, belief: Belief) -> Predicted:
         """Take in what is seen now and return the prediction on the belief's lattice."""
@@ -60,11 +61,12 @@ class ArrivalField:
         robot, arrival = np.array([pose.x, pose.y]), self._arrival(belief.twist.speed_m_s)
         cell_m = field.lattice.cell_m
         taken = taken_on_arrival(field.clearance_m, field.rate_m_s, self._age_s, corner, cell_m, robot, arrival)
-        closing = nearest_closing(field.clearance_m, field.rate_m_s, corner, cell_m, robot, CLOSING_M_S)
+        recent = self._recent.update(field, belief.stamp_ns)
+        closing = nearest_closing(field.clearance_m, field.rate_m_s, recent, corner, cell_m, robot, CLOSING_M_S)
         if closing[4] < LEAST_CELLS:
             closing[4] = 0.0
         closing = self._closing.update(closing, field, self._age_s, elapsed_s)
-        return Predicted(lowered(field.clearance_m, taken, cell_m), closing, arrival.speed_m_s)
+        return Predicted(lowered(field.clearance_m, taken, cell_m), closing)
 
     @property
     def age_s(self) -> F32:
@@ -95,7 +97,7 @@ class ArrivalField:
         at = self._lattice
         corner = np.zeros(0) if at is None else np.array([at.x_m, at.y_m, at.cell_m])
         ages = {"age_corner": corner, "age_s": self._age_s, "age_stamp_ns": np.array([self._stamp_ns], np.int64)}
-        return ages | self._closing.state()
+        return ages | self._closing.state() | self._recent.state()
 
     def take(self, state: dict[str, NDArray[Any]]) -> None:
         """Take over what `state` gave."""
@@ -104,6 +106,7 @@ class ArrivalField:
         self._lattice = Lattice(*corner, *self._age_s.shape) if corner else None
         self._stamp_ns = int(state["age_stamp_ns"][0])
         self._closing.take(state)
+        self._recent.take(state)
 
 
 def _carried(age_s: F32, before: Lattice | None, field: ClearanceField) -> F32:

@@ -58,7 +58,7 @@ def taken_on_arrival(clearance: F32, rate: F32, age_s: F32, corner: F64, cell_m:
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def nearest_closing(clearance: F32, rate: F32, corner: F64, cell_m: float, robot: F64, closing_m_s: float) -> F64:
+def nearest_closing(clearance: F32, rate: F32, recent: F32, corner: F64, cell_m: float, robot: F64, closing_m_s: float) -> F64:
     """Return the boundary that closes in nearest to the robot: its middle in odom, its velocity, its number of cells, shape (5,).
 
     Around a boundary that moves with velocity v the field changes by -grad . v; v is the least-squares fit of that over the
@@ -66,7 +66,8 @@ def nearest_closing(clearance: F32, rate: F32, corner: F64, cell_m: float, robot
 
     Args:
         clearance: shape (rows, columns) [m].
-        rate: shape (rows, columns) [m/s].
+        rate: shape (rows, columns) [m/s], smoothed: it says which cells lie beside what closes in.
+        recent: likewise, as it was of late (`RecentRate`), for the velocity; NaN where nothing is known of it.
         corner: lower corner of the lattice in odom, shape (2,).
         cell_m: size of a cell.
         robot: in odom, shape (2,).
@@ -96,7 +97,8 @@ def nearest_closing(clearance: F32, rate: F32, corner: F64, cell_m: float, robot
         slope_x = (clearance[row, column + 1] - clearance[row, column - 1]) / (2.0 * cell_m)
         slope_y = (clearance[row + 1, column] - clearance[row - 1, column]) / (2.0 * cell_m)
         a, b, d = a + slope_x * slope_x, b + slope_x * slope_y, d + slope_y * slope_y
-        e, f = e - slope_x * rate[row, column], f - slope_y * rate[row, column]
+        change = recent[row, column] if np.isfinite(recent[row, column]) else rate[row, column]
+        e, f = e - slope_x * change, f - slope_y * change
         out[0] += x - slope_x * clearance[row, column]
         out[1] += y - slope_y * clearance[row, column]
         out[4] += 1.0

@@ -10,16 +10,16 @@ from drivers.interface.geometry import SE2, wrap_angle
 from estimators.belief import F64, Belief
 from estimators.field_query import sample
 from planners.clearance_manifold.control_kernels import known_length
-from planners.clearance_manifold.controller import Situation
+from planners.clearance_manifold.controller import UNKNOWN_GAP_M, Situation
 from planners.clearance_manifold.lookout import Outlook
 from planners.clearance_manifold.manifold import Manifold, Stations
 from planners.clearance_manifold.settings import ClearanceManifoldSettings
 from planners.clearance_manifold.tracker import heading
 
+WAY_INSIDE_DEG = 10.0  # so far inside the edge of view the way ahead is kept while something else is watched
 LOOK_AT_MOST_DEG = 120.0  # what closes in from behind is not turned to
 TURNED_RAD = 0.1  # nearer than this it has turned
 BEHIND_M = 1.0  # so far back is looked for room to back off
-UNKNOWN_GAP_M = 0.15  # shorter stretches of unknown cells are holes in a depth image, not the edge of what was seen
 
 
 class Reader:
@@ -84,18 +84,23 @@ class Reader:
         return float(max(0.0, min(wide_m, known_m - self._settings.controller.body_m)))
 
     def _look(self, along_rad: float, closing: F64, point: F64, look_at: F64 | None) -> float:
-        """Return where to look: along the manifold, but turned as far as it takes to keep in view what closes in, or may."""
+        """Return where to look: along the manifold, but turned as far as it takes to keep in view what closes in, or may.
+
+        Who closes in is not followed so far that the way ahead leaves the view.
+        """
         comes = closing[4] > 0.0 and float((closing[:2] - point) @ closing[2:4]) < 0.0  # who has passed is not looked after
         s, watched = self._settings, closing[:2] if comes else look_at
         if watched is None:
             return along_rad
         turns_for_it = look_at is watched and not self._strafes  # it stands meanwhile: no degree more than it takes
         margin_deg = s.controller.look_margin_deg if turns_for_it else s.controller.view_margin_deg
-        room_rad = math.radians(max(0.0, 0.5 * s.prediction.fov_deg - margin_deg))
+        half_deg = 0.5 * s.prediction.fov_deg
+        room_rad = math.radians(max(0.0, half_deg - margin_deg))
         off_rad = wrap_angle(math.atan2(watched[1] - point[1], watched[0] - point[0]) - along_rad)
         if abs(off_rad) > math.radians(LOOK_AT_MOST_DEG):
             return along_rad
-        return along_rad + math.copysign(max(0.0, abs(off_rad) - room_rad), off_rad)
+        most_rad = math.radians(max(0.0, half_deg - WAY_INSIDE_DEG)) if comes else math.pi
+        return along_rad + math.copysign(min(max(0.0, abs(off_rad) - room_rad), most_rad), off_rad)
 
     def _commitment(self, manifold: Manifold, belief: Belief) -> float:
         """Return a_pred, the largest share of the prediction with which all of the manifold keeps rho_min."""

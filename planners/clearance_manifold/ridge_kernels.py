@@ -13,6 +13,7 @@ from estimators.field_query import bilinear
 _FINE = 5  # samples of a tube, to either side
 BODY_M = 0.25  # from the middle of a boundary that closes in to its sides
 NARROW = 5.0  # cost of a station where the shield would stop; less, the nearer it is to ample
+EARLY = 0.7  # of the time to a place: the robot may be there so early
 AWAY = 4.0  # cost of a squared distance between the robot and its own station, per square metre
 
 
@@ -130,28 +131,31 @@ def profiles(ground: Ground, sections: Sections, offsets: F64) -> F64:
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def encounters(sections: Sections, offsets: F64, robot: F64, speed_m_s: float, horizon_s: float, closing: F64) -> F64:
-    """Return how near what closes in will be at every station and offset when the robot gets there, shape (n, m) [m].
+    """Return how near what closes in comes to every station and offset once the robot can be there, shape (n, m) [m].
+
+    The robot may be later than it hopes, as it yields; so all that comes there after its earliest arrival counts: a branch that
+    crosses before somebody is bad for as long as he is on his way, one that crosses behind him is free once he is past.
 
     Args:
         sections: from the robot's own on.
         offsets: shape (m,).
         robot: in odom, shape (2,).
-        speed_m_s: that arrivals are expected at.
+        speed_m_s: the fastest that the robot arrives with.
         horizon_s: how far it is extrapolated.
         closing: middle, velocity and number of cells of the boundary, shape (5,).
     """
     apart = np.full((len(sections.at), len(offsets)), np.inf)
     if closing[4] == 0.0:
         return apart
+    speed2 = max(closing[2] * closing[2] + closing[3] * closing[3], 1e-6)
     for i in range(len(sections.at)):
         for j in range(len(offsets)):
             x = sections.at[i, 0] + offsets[j] * sections.normal[i, 0]
             y = sections.at[i, 1] + offsets[j] * sections.normal[i, 1]
-            h = min(np.hypot(x - robot[0], y - robot[1]) / speed_m_s, horizon_s)
-            for k in range(3):
-                t = h * (0.7 + 0.3 * k)
-                there = np.hypot(x - closing[0] - closing[2] * t, y - closing[1] - closing[3] * t) - BODY_M
-                apart[i, j] = min(apart[i, j], there)
+            first = min(EARLY * np.hypot(x - robot[0], y - robot[1]) / speed_m_s, horizon_s)
+            nearest = ((x - closing[0]) * closing[2] + (y - closing[1]) * closing[3]) / speed2
+            t = min(max(nearest, first), horizon_s)
+            apart[i, j] = np.hypot(x - closing[0] - closing[2] * t, y - closing[1] - closing[3] * t) - BODY_M
     return apart
 
 
@@ -169,9 +173,9 @@ def station_costs(rho: F64, apart: F64, offsets: F64, demand: Demand) -> F64:
     for i in range(rho.shape[0]):
         for j in range(rho.shape[1]):
             short = max(0.0, demand.kept_m - rho[i, j])
-            narrow = min(max(0.0, demand.ample_m - rho[i, j]) / (demand.ample_m - demand.kept_m), 1.0)
-            cost[i, j] = -worth(min(rho[i, j], apart[i, j]), offsets[j], demand) + 20.0 * short + NARROW * narrow
-            cost[i, j] += 3.0 * max(0.0, demand.least_m - apart[i, j])
+            room = min(rho[i, j], apart[i, j])
+            narrow = min(max(0.0, demand.ample_m - room) / (demand.ample_m - demand.kept_m), 1.0)
+            cost[i, j] = -worth(room, offsets[j], demand) + 20.0 * short + NARROW * narrow
     return cost
 
 

@@ -69,7 +69,6 @@ class Tracker:
         self._duals: F64 = np.zeros(len(self._stations.arcs_m))
         self._robot = SE2()
         self._point: F64 = np.zeros(2)  # that follows the manifold
-        self._lateral_m = 0.0
         self._stamp_ns = 0
         self._looked_ns = 0
 
@@ -91,8 +90,6 @@ class Tracker:
         on_chart = chart.project(self._points)
         order = np.argsort(on_chart[:, 0], kind="stable")
         self._arcs_m, self._offset_m = on_chart[order, 0], on_chart[order, 1]
-        arc_m, robot_m = chart.project(self._point[None])[0]
-        self._lateral_m = float(robot_m - np.interp(arc_m, self._arcs_m, self._offset_m))
 
     def advance(self, scene: Scene, belief: Belief, new_goal: bool) -> Continuation:
         """Return this tick's manifold and keep it."""
@@ -123,8 +120,7 @@ class Tracker:
             return Category.TASK_RESET, "goal changed"
         if belief.odom_from_base.distance(self._robot) > s.pose_jump_m:
             return Category.SENSING_FAILURE, "pose jump"
-        moved = abs((scene.robot_m - prior.offset_m[own]) - self._lateral_m)
-        if moved > s.lateral_m:
+        if abs(float((scene.robot - self._point) @ scene.sections.normal[own])) > s.lateral_m:
             return Category.SENSING_FAILURE, "lateral drift"
         if not s.enabled:
             return Category.REGULAR, "continuation is off"
@@ -169,7 +165,6 @@ class Tracker:
     def _keep(self, scene: Scene, manifold: Manifold, duals: F64, belief: Belief) -> None:
         self._points, self._arcs_m, self._offset_m, self._duals = manifold.points, manifold.arcs_m, manifold.offset_m, duals
         self._robot, self._point, self._stamp_ns = belief.odom_from_base, scene.robot, belief.stamp_ns
-        self._lateral_m = float(scene.robot_m - manifold.offset_m[self._stations.own])
         self._drift.keep(Past(belief.stamp_ns, manifold.points, manifold.arcs_m, manifold.offset_m))
 
     def state(self) -> dict[str, NDArray[Any]]:
@@ -180,7 +175,7 @@ class Tracker:
             "arcs_m": self._arcs_m,
             "offset_m": self._offset_m,
             "duals": self._duals,
-            "robot": np.array([robot.x, robot.y, robot.yaw, self._lateral_m, *self._point]),
+            "robot": np.array([robot.x, robot.y, robot.yaw, *self._point]),
             "stamps_ns": np.array([self._stamp_ns, self._looked_ns], np.int64),
             **self._drift.state(),
         }
@@ -189,7 +184,7 @@ class Tracker:
         """Take over what `state` gave."""
         self._points, self._arcs_m = state["points"], state["arcs_m"]
         self._offset_m, self._duals = state["offset_m"], state["duals"]
-        x, y, yaw, self._lateral_m, *point = state["robot"].tolist()
+        x, y, yaw, *point = state["robot"].tolist()
         self._point = np.array(point)
         self._robot = SE2(x, y, yaw)
         self._stamp_ns, self._looked_ns = (int(stamp) for stamp in state["stamps_ns"])

@@ -1,0 +1,82 @@
+"""Who closes in: how fast he was of late, where he will still come, and where the robot may give way to."""
+
+import numpy as np
+import pytest
+
+from drivers.interface.geometry import SE2
+from estimators.belief import ClearanceField, Lattice
+from planners.clearance_manifold.control_kernels import known_way
+from planners.clearance_manifold.recent_rate import WINDOW_S, RecentRate
+from planners.clearance_manifold.ridge_kernels import BODY_M, Sections, encounters
+
+OFFSETS = np.linspace(-1.0, 1.0, 5)
+CELL_M = 0.05
+
+
+def field_of(clearance_m, known=None, corner=(0.0, 0.0)):
+    clearance = np.full((6, 8), clearance_m, np.float32)
+    seen = np.ones(clearance.shape, np.bool_) if known is None else known
+    return ClearanceField(Lattice(*corner, CELL_M, *clearance.shape), clearance, np.zeros_like(clearance), seen, seen)
+
+
+@pytest.mark.parametrize("period_s", [0.05, 0.2])
+def test_the_recent_rate_has_caught_up_a_window_after_somebody_sets_off(period_s):
+    rate, still_s = RecentRate(), 1.0
+    for tick in range(round(2.0 / period_s)):
+        now_s = tick * period_s
+        recent = rate.update(field_of(2.0 - max(0.0, now_s - still_s)), round(now_s * 1e9))
+        if now_s >= still_s + 2.0 * WINDOW_S:
+            assert recent == pytest.approx(np.full((6, 8), -1.0), abs=1e-4)
+        elif now_s <= still_s and tick:
+            assert recent == pytest.approx(np.zeros((6, 8)), abs=1e-6)
+
+
+def test_the_recent_rate_knows_nothing_of_cells_that_were_not_seen_then_and_moves_with_the_window():
+    rate, known = RecentRate(), np.ones((6, 8), np.bool_)
+    known[:, 3] = False
+    rate.update(field_of(1.0, known), 0)
+    recent = rate.update(field_of(0.9, corner=(2 * CELL_M, 0.0)), round(WINDOW_S * 1e9))
+    assert np.isnan(recent[:, [1, 6, 7]]).all()  # not seen then, and off the window then
+    assert recent[:, [0, 2, 3, 4, 5]] == pytest.approx(np.full((6, 5), -0.5), abs=1e-4)
+
+
+def test_what_was_taken_in_goes_on_from_a_snapshot():
+    rate, other = RecentRate(), RecentRate()
+    for k in range(7):
+        rate.update(field_of(1.0 - 0.03 * k), k * 50_000_000)
+    other.take(rate.state())
+    later = (field_of(0.7), 350_000_000)
+    assert (rate.update(*later) == other.update(*later)).all()
+
+
+def apart_at(xs, closing):
+    sections = Sections(
+        np.stack((np.array(xs), np.zeros(len(xs))), axis=1), np.tile([0.0, 1.0], (len(xs), 1)), np.zeros((len(xs), 2))
+    )
+    return encounters(sections, OFFSETS, np.zeros(2), 0.5, 3.0, np.array([*closing, 20.0]))
+
+
+def test_a_place_that_somebody_still_comes_to_is_taken_however_late_the_robot_is():
+    """He crosses from the right to the left, 1 m ahead, and is there after 1 s; the robot not before 0.7 * 2 s."""
+    apart = apart_at([1.0], (1.0, -0.5, 0.0, 0.5))[0]
+    late = 0.7 * np.hypot(1.0, OFFSETS) / 0.5
+    assert apart == pytest.approx(np.where(-0.5 + 0.5 * late < OFFSETS, 0.0, -0.5 + 0.5 * late - OFFSETS) - BODY_M, abs=1e-9)
+    assert apart[0] > 0.9  # behind him
+    assert apart[-1] == pytest.approx(-BODY_M)  # where he goes
+
+
+def test_beyond_the_horizon_he_counts_where_he_is_by_then():
+    apart = apart_at([1.0], (1.0, -3.0, 0.0, 0.5))[0]
+    assert apart == pytest.approx(OFFSETS + 1.5 - BODY_M)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.7, -2.5])
+def test_the_known_way_ends_before_the_body_meets_what_was_never_seen(yaw):
+    known = np.ones((80, 80), np.bool_)
+    corner, robot = np.array([-2.0, -2.0]), np.zeros(2)
+    along = SE2(0.0, 0.0, yaw).apply(np.array([1.0, 0.0]))
+    y, x = np.mgrid[0:80, 0:80] * CELL_M - 2.0 + 0.5 * CELL_M
+    known[(x * along[0] + y * along[1]) > 0.55] = False  # from here on, in that direction
+    free_m = known_way(known, corner, CELL_M, robot, along, 0.12, 0.25, 0.15, 0.6)
+    assert free_m == pytest.approx(0.3, abs=0.05)
+    assert known_way(known, corner, CELL_M, robot, -along, 0.12, 0.25, 0.15, 0.6) == pytest.approx(0.6, abs=0.01)
