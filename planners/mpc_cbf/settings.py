@@ -14,7 +14,7 @@ class BarrierMpcSettings(Settings):
     steps: int = Field(20, ge=3, le=60, description="of the prediction (N)")
     iterations: int = Field(1, ge=1, le=10, description="quadratic programs for one decision")
     barrier_rate_per_s: float = Field(
-        2.0, gt=0.0, le=50.0, description="how fast a barrier may fall; gamma is 1 - exp(-rate step)"
+        1.0, gt=0.0, le=50.0, description="how fast a barrier may fall; gamma is 1 - exp(-rate step)"
     )
     margin_m: float = Field(0.07, ge=0.0, le=1.0, description="kept free beyond the robot's radius")
     tracks: int = Field(6, ge=0, le=32, description="of which the nearest are constraints")

@@ -138,7 +138,7 @@ def test_reference_begins_at_the_nearest_point_of_the_route():
 
 def test_barriers_fall_no_faster_than_they_may_along_every_prediction_and_on_the_way():
     walker = Disc(5.0, 0.3, 0.3, -0.3)
-    planner = planner_of(BarrierMpc)
+    planner = planner_of(BarrierMpc, barrier_rate_per_s=2.0)
     trace = run(planner, [], [walker], (4.0, 0.0))
     assert max(plan.diagnostics.worst_fall_m for plan in trace.plans) < 0.01
     barrier = np.array(trace.clearance_m) - MARGIN_M
@@ -193,7 +193,7 @@ def test_prediction_is_drawn_where_the_robot_goes():
     drawn = {drawing.name: drawing.points_in_odom for drawing in plan.drawings}
     assert drawn["prediction"].shape == (21, 2)
     assert drawn["prediction"][0] == pytest.approx([0.0, 0.0])
-    assert drawn["prediction"][-1, 0] > 0.8
+    assert drawn["prediction"][-1, 0] > 0.5
     assert drawn["barriers at the horizon"][0] == pytest.approx([1.0, 1.0])
 
 
