@@ -60,6 +60,5 @@ class Differential:
             return BodyTwist(-back, 0.0, 0.0)
         if forward <= STANDSTILL_M_S:
             return BodyTwist(0.0, 0.0, self.turn_to(off_rad if speed > STANDSTILL_M_S else look_rad))
-        asked, most = abs(float(u[1])) / s.look_ahead_m, abs(self.turn_to(off_rad))
-        share = min(1.0, most / asked) if asked > 1e-9 else 1.0
-        return BodyTwist(min(forward * share, cap.vx), 0.0, math.copysign(min(asked, most), float(u[1])))
+        turn = min(abs(float(u[1])) / s.look_ahead_m, abs(self.turn_to(off_rad)))
+        return BodyTwist(min(forward, cap.vx), 0.0, math.copysign(turn, float(u[1])))
