@@ -9,6 +9,7 @@ from estimators.belief import F64, Mask
 
 STRAIGHT_ON_M = 0.2  # with a miss smaller than this somebody comes straight on
 CROSSING = 0.3  # the share of a velocity that leads across the way of who crosses
+LED_M = 0.2  # a manifold so far aside has chosen where to pass
 CHANGE_M = 0.1  # who turns out to miss by this on the other hand passes there
 
 
@@ -92,7 +93,7 @@ def longitudinal(u_x: float, u_y: float, t_x: float, t_y: float, speed: float, c
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def give_way(
-    u: F64, robot: F64, closing: F64, apart_m: float, horizon_s: float, side: F64, tangent: F64, hand: float
+    u: F64, robot: F64, closing: F64, apart_m: float, horizon_s: float, side: F64, tangent: F64, hand: float, lead_m: float = 0.0
 ) -> tuple[F64, float]:
     """Return the velocity nearest to u, shape (2,), with which what closes in passes at `apart_m` if it goes on as it does.
 
@@ -109,6 +110,7 @@ def give_way(
         horizon_s: later encounters do not count.
         side: where the manifold leads to, shape (2,), unit: the robot goes there when somebody comes straight on along the way.
         tangent: of the way, shape (2,), unit; behind who comes straight on across it, the robot passes.
+        lead_m: how far the manifold is to that side: where it has gone aside, the robot goes there for who comes along the way.
         hand: on which he passes at the tick before, seen along his way: 1 left of the robot, -1 right of it; 0: nobody came.
 
     Returns:
@@ -124,8 +126,10 @@ def give_way(
     speed = np.sqrt(speed2)
     left_x, left_y = -closing[3] / speed, closing[2] / speed
     miss = x * left_x + y * left_y  # what is along his way is over at t
-    if hand == 0.0 and abs(miss) < STRAIGHT_ON_M:
-        across = tangent[0] * closing[3] - tangent[1] * closing[2]  # his speed to the left, across the way
+    across = tangent[0] * closing[3] - tangent[1] * closing[2]  # his speed to the left, across the way
+    if lead_m > LED_M and abs(miss) < apart_m and abs(across) <= CROSSING * speed:
+        hand = -1.0 if side[0] * left_x + side[1] * left_y > 0.0 else 1.0
+    elif hand == 0.0 and abs(miss) < STRAIGHT_ON_M:
         if abs(across) > CROSSING * speed:
             behind = across * (tangent[0] * left_y - tangent[1] * left_x)
             hand = 1.0 if behind > 0.0 else -1.0

@@ -118,7 +118,9 @@ class ManifoldController:
         error_m = float(np.hypot(*at.error))
         side = -at.error / error_m if error_m > 1e-6 else np.array([-at.tangent[1], at.tangent[0]])
         yielding: F64
-        yielding, self._hand = give_way(u, at.robot, at.closing, self._apart_m, s.yield_horizon_s, side, at.tangent, self._hand)
+        yielding, self._hand = give_way(
+            u, at.robot, at.closing, self._apart_m, s.yield_horizon_s, side, at.tangent, self._hand, error_m
+        )
         return yielding
 
     def reset(self) -> None:

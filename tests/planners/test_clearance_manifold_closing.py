@@ -5,7 +5,7 @@ import pytest
 
 from drivers.interface.geometry import SE2
 from estimators.belief import ClearanceField, Lattice
-from planners.clearance_manifold.control_kernels import known_way
+from planners.clearance_manifold.control_kernels import give_way, known_way
 from planners.clearance_manifold.recent_rate import WINDOW_S, RecentRate
 from planners.clearance_manifold.ridge_kernels import BODY_M, Sections, encounters
 
@@ -80,3 +80,16 @@ def test_the_known_way_ends_before_the_body_meets_what_was_never_seen(yaw):
     free_m = known_way(known, corner, CELL_M, robot, along, 0.12, 0.25, 0.15, 0.6)
     assert free_m == pytest.approx(0.3, abs=0.05)
     assert known_way(known, corner, CELL_M, robot, -along, 0.12, 0.25, 0.15, 0.6) == pytest.approx(0.6, abs=0.01)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_where_the_manifold_has_gone_aside_the_robot_goes_there_for_who_comes_along_the_way(side):
+    """He comes straight on; he was taken to pass on the manifold's side, and the robot had begun to go to the other."""
+    closing, tangent = np.array([2.0, 0.02 * side, -1.0, 0.0, 40.0]), np.array([1.0, 0.0])
+    towards, nobody = np.array([0.0, side]), np.zeros(2)
+    led, hand = give_way(nobody, nobody, closing, 0.6, 2.5, towards, tangent, 0.0, 0.5)
+    again, _ = give_way(nobody, nobody, closing, 0.6, 2.5, towards, tangent, -hand, 0.5)
+    stuck, _ = give_way(nobody, nobody, closing, 0.6, 2.5, towards, tangent, -hand, 0.0)
+    assert led[1] * side > 0.2
+    assert again == pytest.approx(led)
+    assert stuck[1] * side < -0.2  # what led in front of him
