@@ -127,6 +127,7 @@ class Rollouts(NamedTuple):
     static_m: F32  # (commands,): least clearance to what stands still, surface to surface, exact up to the ground's `far_m`
     held: NDArray[np.int64]  # (commands,): steps driven before it had to brake for that; all of them where it had not
     brakable: NDArray[np.bool_]  # (commands,): it can stop in time where it has to
+    rest: F32  # (commands, 2): where it stands after the last step when it brakes there, in odom
 
 
 def path_of(rolled: Rollouts, command: int) -> F64:
@@ -197,6 +198,7 @@ def roll_out(pose: F64, now: F64, speeds: F64, turns: F64, drive: Drive, step_s:
     count = len(speeds) * len(turns)
     x, y, yaw = np.empty((count, steps), np.float32), np.empty((count, steps), np.float32), np.empty((count, steps), np.float32)
     static, held, brakable = np.empty(count, np.float32), np.empty(count, np.int64), np.empty(count, np.bool_)
+    rest = np.empty((count, 2), np.float32)
     cosine, sine, heading = np.empty(steps), np.empty(steps), np.empty(steps)
     here = bilinear(around.clearance, around.corner_x, around.corner_y, around.cell_m, pose[0], pose[1]) - around.radius_m
     least = min(around.hold_m, here - _SPARE_M)
@@ -229,4 +231,6 @@ def roll_out(pose: F64, now: F64, speeds: F64, turns: F64, drive: Drive, step_s:
             fastest = max(abs(v[i, 0]), abs(v[i, 1]))
             stop_m = fastest * step_s + 0.5 * fastest * fastest / drive.acceleration
             static[u], held[u], brakable[u] = room, driven, driven == steps or stop_m <= travelled
-    return Rollouts(x, y, yaw, static, held, brakable)
+            on_m = 0.5 * v[i, steps] * abs(v[i, steps]) / drive.acceleration if driven == steps else 0.0
+            rest[u, 0], rest[u, 1] = px + on_m * cosine[steps - 1], py + on_m * sine[steps - 1]
+    return Rollouts(x, y, yaw, static, held, brakable, rest)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from planners.planner import Diagnostics
 from planners.prediction.chance import Chance
 from planners.prediction.conjectures import ConjectureFamily
 from planners.prediction.predictor import Futures, Occasion, Predictor
+from planners.prediction.walls import Walls, keep_out
 from planners.rcsp.kernels import (
     INVERSE_CLEARANCE,
     NEAR_MISS,
@@ -19,6 +20,7 @@ from planners.rcsp.kernels import (
     Risk,
     clearances,
     largest,
+    lower_at_rest,
     mean_risk,
     reacting_clearances,
     tails,
@@ -68,11 +70,15 @@ class Evaluator:
             settings.lattice.latency_s + settings.step_s * np.arange(1, settings.steps + 1), np.float64
         )
         self._steps_s = np.diff(self._times_s, prepend=0.0)
+        after_s = settings.rest_step_s * np.arange(1, settings.rest_steps + 1)
+        self._all_times_s: F64 = np.concatenate((self._times_s, self._times_s[-1] + after_s))
         r = settings.risk
         self._risk = Risk(KINDS[r.kind], r.safe_m, r.collision, r.depth_m)
         self._bound = max(largest(self._risk, r.safe_m), largest(self._risk, r.static_safe_m))
 
-    def evaluate(self, rolled: Rollouts, reward: F64, nominal: int, scenarios: int, chance: Chance, room_m: float) -> Evaluation:
+    def evaluate(
+        self, rolled: Rollouts, reward: F64, nominal: int, scenarios: int, chance: Chance, room_m: float, walls: Walls
+    ) -> Evaluation:
         """Return the evaluation of all commands in `scenarios` futures, the same for every command.
 
         Args:
@@ -82,9 +88,10 @@ class Evaluator:
             scenarios: N.
             chance: what futures are drawn from.
             room_m: least clearance to what stands still on the way ahead.
+            walls: what nobody goes through.
         """
         s, static_safe_m = self._settings, self.static_safe_m(room_m)
-        futures, clearance = self._held_against(rolled, path_of(rolled, nominal), scenarios, chance)
+        futures, clearance = self._held_against(rolled, path_of(rolled, nominal), scenarios, chance, walls)
         tail = tail_of(s.risk, scenarios)
         risk, tail_room_m, free = tails(clearance, rolled.static_m, rolled.brakable, tail, self._risk, static_safe_m)
         return Evaluation(reward - s.risk.weight * risk, reward, risk, tail_room_m, free, clearance, futures, tail, static_safe_m)
@@ -98,15 +105,22 @@ class Evaluator:
         s = self._settings
         return min(s.risk.static_safe_m, max(room_m, s.hold_m, _LEAST_SAFE_M)) if room_m > 0.0 else s.risk.static_safe_m
 
-    def _held_against(self, rolled: Rollouts, robot: F64, scenarios: int, chance: Chance) -> tuple[Futures, F32]:
-        far_m, predictor = self._settings.risk.safe_m, self._predictor
-        occasion = Occasion(self._times_s, robot, scenarios)
+    def _held_against(self, rolled: Rollouts, robot: F64, scenarios: int, chance: Chance, walls: Walls) -> tuple[Futures, F32]:
+        far_m, predictor, steps = self._settings.risk.safe_m, self._predictor, self._settings.steps
+        stays = np.concatenate((robot, np.repeat(robot[-1:], self._settings.rest_steps, axis=0)))
+        occasion = Occasion(self._all_times_s, stays, scenarios)
+        reacting = self._settings.reaction == "candidate" and isinstance(predictor, ConjectureFamily)
         if self._settings.reaction == "candidate" and isinstance(predictor, ConjectureFamily):
             futures, draws = predictor.sample_with_draws(occasion, chance)
-            return futures, reacting_clearances(rolled.x, rolled.y, draws, self._steps_s, far_m)
-        futures = predictor.sample(occasion, chance)
-        contact = (futures.radius_m + self._radius_m).astype(np.float32)
-        return futures, clearances(rolled.x, rolled.y, futures.position_in_odom, contact, far_m)
+            clearance = reacting_clearances(rolled.x, rolled.y, draws, self._steps_s, far_m)
+        else:
+            futures = predictor.sample(occasion, chance)
+        keep_out(futures.position_in_odom, futures.radius_m, walls)
+        contact, position = (futures.radius_m + self._radius_m).astype(np.float32), futures.position_in_odom
+        if not reacting:
+            clearance = clearances(rolled.x, rolled.y, position[:steps], contact, far_m)
+        lower_at_rest(rolled.rest, position[steps:], contact, far_m, tail_of(self._settings.risk, scenarios), clearance)
+        return replace(futures, position_in_odom=position[:steps]), clearance
 
     def mean_risk(self, told: Evaluation, rolled: Rollouts, command: int) -> float:
         """Return the mean over the scenarios of a command's risk."""

@@ -18,6 +18,7 @@ F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
 FAST = {"contract", "reassoc", "arcp", "nsz"}
 
+_TOUCH = np.nextafter(np.float32(0.0), np.float32(-1.0))  # the largest clearance of who overlaps
 INVERSE_CLEARANCE, VIOLATION, NEAR_MISS = 0, 1, 2
 
 
@@ -166,6 +167,50 @@ def clearances(x: F32, y: F32, futures: F32, contact: F32, far_m: float) -> F32:
                 nearest_squared(x[u], y[u], own, near[:count], best)
                 lower_clearance(best, contact[m], clearance[u])
     return clearance
+
+
+@njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[untyped-decorator]
+def lower_at_rest(rest: F32, futures: F32, contact: F32, far_m: float, tail: int, clearance: F32) -> None:
+    """Lower clearances, shape (commands, scenarios), to what a robot that stands after the horizon has, but not below zero.
+
+    A command that leads to where somebody comes has led into a trap; it is a near miss and no collision yet, as there is time
+    to leave.  Nothing is done for a command whose tail touches somebody before: it is infeasible already.
+
+    Args:
+        rest: where each command comes to rest, shape (commands, 2).
+        futures: after the horizon, shape (steps, obstacles, 2, scenarios).
+        contact: distance of the centres at contact, shape (obstacles,).
+        far_m: clearance that matters.
+        tail: scenarios in it.
+        clearance: over the horizon, lowered, shape (commands, scenarios).
+    """
+    steps, obstacles, _, n = futures.shape
+    if steps == 0 or n == 0:
+        return
+    zero, best, own, all_steps = np.float32(0.0), np.empty(n, np.float32), np.empty((steps, 2, n), np.float32), np.arange(steps)
+    x, y, here, lost = (
+        np.empty(steps, np.float32),
+        np.empty(steps, np.float32),
+        np.empty(2, np.float32),
+        np.empty(len(rest), np.bool_),
+    )
+    for u in range(len(rest)):
+        lost[u] = count_within(clearance[u], _TOUCH) >= tail
+    for m in range(obstacles):
+        own[:] = futures[:, m]
+        box, reach = boxes(own), contact[m] + np.float32(far_m)
+        left, right, bottom, top = box[0].min() - reach, box[1].max() + reach, box[2].min() - reach, box[3].max() + reach
+        for u in range(len(rest)):
+            here[:] = rest[u]
+            if lost[u] or here[0] < left or here[0] > right or here[1] < bottom or here[1] > top:
+                continue
+            best[:], x[:], y[:] = reach * reach, here[0], here[1]
+            nearest_squared(x, y, own, all_steps, best)
+            row = clearance[u]
+            for i in range(n):
+                c = np.sqrt(best[i]) - contact[m]
+                c = c if c > zero else zero
+                row[i] = c if c < row[i] else row[i]
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

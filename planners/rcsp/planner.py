@@ -23,6 +23,7 @@ from planners.prediction.conjectures import ConjectureFamily
 from planners.prediction.constant_velocity import ConstantVelocityPredictor
 from planners.prediction.predictor import Predictor
 from planners.prediction.random_walk import RandomWalkPredictor
+from planners.prediction.walls import Walls
 from planners.rcsp.budget import affordable
 from planners.rcsp.drawing import commitment_step, drawn
 from planners.rcsp.evaluation import Evaluation, Evaluator, RcspDiagnostics
@@ -83,7 +84,8 @@ class Rcsp:
     def _planned(self, belief: Belief, route: Route, budget_ns: int | None) -> Plan:
         belief = replace(belief, tracks=movers(belief))
         self._predictor.observe(belief)
-        obstacles, distances = len(self._predictor.seen), len(self._lattice) * self._settings.steps
+        s, obstacles = self._settings, len(self._predictor.seen)
+        distances = len(self._lattice) * (s.steps + s.rest_steps)
         reacting = self._settings.reaction == "candidate"
         scenarios = affordable(self._settings.budget, budget_ns, distances * obstacles, reacting=reacting)
         reason = self._refusal(belief, route) or ("there is no time for any scenario" if scenarios == 0 else "")
@@ -92,10 +94,13 @@ class Rcsp:
             said = RcspDiagnostics(stopped=reason, budget_ms=(budget_ns or 0) / 1e6, obstacles=obstacles)
             return Plan(BodyTwist(), diagnostics=said)
         path, along = self._ahead(route)
-        rolled, room_m = self._rolled_out(belief, path[1 : np.searchsorted(along, self._reach_m, side="right")])
+        around = self._ground(belief)
+        rolled = self._rolled_out(belief, around)
+        room_m = least_room(path[1 : np.searchsorted(along, self._reach_m, side="right")], around)
         reward = self._reward(belief, path, along, rolled)
         chance = Chance(self._setup.seed, "rcsp", belief.tick) if self._settings.fresh_draws else self._chance
-        told = self._evaluator.evaluate(rolled, reward, self._last, scenarios, chance, room_m)
+        walls = Walls(around.clearance, around.corner_x, around.corner_y, around.cell_m)
+        told = self._evaluator.evaluate(rolled, reward, self._last, scenarios, chance, room_m, walls)
         self._last, free = told.best(self._effort)
         return self._plan(belief, rolled, told, free, budget_ns)
 
@@ -116,25 +121,28 @@ class Rcsp:
         ahead: tuple[F64, F64] = beginning(route.path_in_odom, self._reach_m + _ROUTE_SPARE_M, _SPACING_M)
         return ahead
 
-    def _rolled_out(self, belief: Belief, way: F64) -> tuple[Rollouts, float]:
-        """Return where each command leads from when it takes hold, in the field of what stands still, and the room on the way."""
-        s, pose, radius_m = self._settings, belief.odom_from_base, self._setup.robot_radius_m
-        last = self._lattice.twist(self._last)
-        start, now = after_latency(
-            np.array([pose.x, pose.y, pose.yaw]), np.array([belief.twist.vx, belief.twist.wz]),
-            np.array([last.vx, last.wz]), self._drive,
-        )  # fmt: skip
+    def _ground(self, belief: Belief) -> Ground:
+        """Return what stands still, as far as it matters to any command."""
+        s, radius_m = self._settings, self._setup.robot_radius_m
         fastest = max(abs(belief.twist.vx), *np.abs(self._lattice.speed_m_s[[0, -1]]).tolist())
         far_m = max(s.risk.safe_m, s.risk.static_safe_m, s.hold_m)
         reach_m = fastest * (s.lattice.latency_s + s.step_s * s.steps)
         near = surroundings(belief, s.track_margin_m, reach_m, far_m + radius_m + _FIELD_SPARE_M)
-        around = Ground(
+        return Ground(
             near.clearance_m, near.label, near.lattice.x_m, near.lattice.y_m, near.lattice.cell_m,
             radius_m, s.hold_m, s.body_m if s.stop_before_unknown else -1.0, far_m,
         )  # fmt: skip
+
+    def _rolled_out(self, belief: Belief, around: Ground) -> Rollouts:
+        """Return where each command leads from when it takes hold."""
+        s, pose, last = self._settings, belief.odom_from_base, self._lattice.twist(self._last)
+        start, now = after_latency(
+            np.array([pose.x, pose.y, pose.yaw]), np.array([belief.twist.vx, belief.twist.wz]),
+            np.array([last.vx, last.wz]), self._drive,
+        )  # fmt: skip
         speeds, turns = self._lattice.speed_m_s, self._lattice.turn_rad_s
         rolled: Rollouts = roll_out(start, now, speeds, turns, self._drive, s.step_s, s.steps, around)
-        return rolled, least_room(way, around)
+        return rolled
 
     def _reward(self, belief: Belief, path: F64, along: F64, rolled: Rollouts) -> F64:
         """Return R of every command, shape (commands,): progress along the route over what full speed makes, less change."""

@@ -19,6 +19,7 @@ from planners.prediction.posterior import floored, heaviest, updated
 from planners.prediction.predictor import Occasion, Predictor
 from planners.prediction.random_walk import RandomWalkPredictor
 from planners.prediction.settings import FAMILY, PredictionSettings
+from planners.prediction.walls import Walls, keep_out
 from tests.planners.synthetic import belief_of
 
 ROBOT_M, STEP_S = 0.3, 0.1
@@ -222,3 +223,30 @@ def test_fewer_scenarios_and_fewer_rows_are_the_first_of_more():
     assert np.array_equal(chance.uniform("conjecture", 1, 8)[0], Chance(7, "test").uniform("conjecture", 2, 24)[0, :, :8])
     assert not np.array_equal(few, Chance(8, "test").normal("start", 2, 4, 16))
     assert not np.array_equal(many[0], many[1])
+
+
+def walled(position, radius=0.25):
+    """Return futures beside a wall of cells at x = 2, each shape (steps, 2), after walls were made to hold."""
+    x = np.arange(-1.0, 4.0, 0.05) + 0.025
+    field = np.repeat(np.abs(x - 2.025)[None], 100, axis=0).astype(np.float32)  # (rows, columns)
+    futures = np.asarray(position, np.float32)[:, None, :, None].copy()
+    keep_out(futures, np.array([radius]), Walls(field, -1.0, -1.0, 0.05))
+    return futures[:, 0, :, 0]
+
+
+def test_nobody_goes_through_a_wall_but_along_it():
+    steps = np.arange(1, 26)
+    oblique = walled(np.stack((0.08 * steps, 0.04 * steps), axis=1))
+    assert oblique[:, 0].max() < 2.0
+    assert np.diff(oblique[:, 1]).min() > 0.0  # what leads along the wall stays
+    assert oblique[-1, 1] == pytest.approx(1.0, abs=0.05)
+    straight = walled(np.stack((0.08 * steps, np.zeros(25)), axis=1))
+    assert 1.65 < straight[-1, 0] < 1.9  # 0.7 of the radius from the wall, to a cell and a step of two
+
+
+def test_who_meets_no_wall_goes_on_as_he_was_drawn_and_his_own_cells_do_not_hold_him():
+    steps = np.arange(1, 26)
+    free = np.stack((0.05 * steps - 0.5, 0.03 * steps), axis=1).astype(np.float32)
+    assert np.array_equal(walled(free), free)
+    leaving = np.stack((2.0 - 0.05 * steps, np.zeros(25)), axis=1).astype(np.float32)
+    assert np.array_equal(walled(leaving), leaving)
