@@ -131,10 +131,10 @@ class SmoothnessSettings(Settings):
     """How the velocity asked follows the one wanted; of a base that can strafe."""
 
     enabled: bool = Field(default=True, description="off: it is asked for at once, as in the paper")
-    jerk_m_s3: float = Field(default=0.8, gt=0.0, le=1000.0, description="used while nothing presses")
-    urgent_m_s3: float = Field(default=8.0, gt=0.0, le=1000.0, description="used at most, to stop in time or let somebody pass")
+    jerk_m_s3: float = Field(default=3.0, gt=0.0, le=1000.0, description="used while nothing presses")
+    urgent_m_s3: float = Field(default=15.0, gt=0.0, le=1000.0, description="used at most, to stop in time or let somebody pass")
     watchful_m_s3: float = Field(
-        default=2.0, gt=0.0, le=1000.0, description="used at most to stop before an opening that the look-out finds late"
+        default=4.0, gt=0.0, le=1000.0, description="used at most to stop before an opening that the look-out finds late"
     )
     response_per_s: float = Field(default=6.0, gt=0.0, le=100.0, description="of small differences: faster noise is damped")
     slip_m_s: float = Field(
