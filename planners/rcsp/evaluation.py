@@ -106,21 +106,22 @@ class Evaluator:
         return min(s.risk.static_safe_m, max(room_m, s.hold_m, _LEAST_SAFE_M)) if room_m > 0.0 else s.risk.static_safe_m
 
     def _held_against(self, rolled: Rollouts, robot: F64, scenarios: int, chance: Chance, walls: Walls) -> tuple[Futures, F32]:
-        far_m, predictor, steps = self._settings.risk.safe_m, self._predictor, self._settings.steps
-        stays = np.concatenate((robot, np.repeat(robot[-1:], self._settings.rest_steps, axis=0)))
+        s, predictor = self._settings, self._predictor
+        far_m = s.risk.safe_m
+        stays = np.concatenate((robot, np.repeat(robot[-1:], s.rest_steps, axis=0)))
         occasion = Occasion(self._all_times_s, stays, scenarios)
-        reacting = self._settings.reaction == "candidate" and isinstance(predictor, ConjectureFamily)
-        if self._settings.reaction == "candidate" and isinstance(predictor, ConjectureFamily):
+        if s.reaction == "candidate" and isinstance(predictor, ConjectureFamily):
             futures, draws = predictor.sample_with_draws(occasion, chance)
+            keep_out(futures.position_in_odom, futures.radius_m, walls)
+            contact = (futures.radius_m + self._radius_m).astype(np.float32)
             clearance = reacting_clearances(rolled.x, rolled.y, draws, self._steps_s, far_m)
         else:
             futures = predictor.sample(occasion, chance)
-        keep_out(futures.position_in_odom, futures.radius_m, walls)
-        contact, position = (futures.radius_m + self._radius_m).astype(np.float32), futures.position_in_odom
-        if not reacting:
-            clearance = clearances(rolled.x, rolled.y, position[:steps], contact, far_m)
-        lower_at_rest(rolled.rest, position[steps:], contact, far_m, tail_of(self._settings.risk, scenarios), clearance)
-        return replace(futures, position_in_odom=position[:steps]), clearance
+            keep_out(futures.position_in_odom, futures.radius_m, walls)
+            contact = (futures.radius_m + self._radius_m).astype(np.float32)
+            clearance = clearances(rolled.x, rolled.y, futures.position_in_odom[: s.steps], contact, far_m)
+        lower_at_rest(rolled.rest, futures.position_in_odom[s.steps :], contact, far_m, tail_of(s.risk, scenarios), clearance)
+        return replace(futures, position_in_odom=futures.position_in_odom[: s.steps]), clearance
 
     def mean_risk(self, told: Evaluation, rolled: Rollouts, command: int) -> float:
         """Return the mean over the scenarios of a command's risk."""

@@ -189,11 +189,11 @@ def test_a_base_that_may_not_reverse_does_not():
 def test_prediction_is_drawn_where_the_robot_goes():
     belief = belief_of([])
     walker = Disc(2.0, 1.0, 0.3, -0.5)
-    plan = Tracking(planner_of(BarrierMpc), [walker]).plan(belief, route_from(belief, 4.0, 0.0))
+    plan = Tracking(planner_of(BarrierMpc, barrier_rate_per_s=2.0), [walker]).plan(belief, route_from(belief, 4.0, 0.0))
     drawn = {drawing.name: drawing.points_in_odom for drawing in plan.drawings}
     assert drawn["prediction"].shape == (21, 2)
     assert drawn["prediction"][0] == pytest.approx([0.0, 0.0])
-    assert drawn["prediction"][-1, 0] > 0.5
+    assert drawn["prediction"][-1, 0] > 0.8
     assert drawn["barriers at the horizon"][0] == pytest.approx([1.0, 1.0])
 
 
