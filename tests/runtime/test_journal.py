@@ -89,3 +89,15 @@ def test_the_command_keeps_what_it_did(tmp_path: Path) -> None:
     assert owner["of"].startswith("'t' at ")
     assert run["case"]["configuration"] == "door"
     assert run["result"]["outcome"] == "timed_out"
+
+
+def test_changed_code_does_not_go_on_from_results_it_may_not_have_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("runtime.log.header.code_version", lambda: ("v1", True))
+    experiment, kept = tmp_path / "e.yaml", tmp_path / "kept.jsonl"
+    experiment.write_text("title: t\nconfigurations: [door]\nvariants: {idle: [planner.name=idle]}\nseeds: 1\n")
+    kept.write_text('{"of": "\'t\' at v1"}\n')
+    assert run_command(["evaluate", str(experiment), "--jobs", "1", "--journal", str(kept)]) == 2
+    assert "this code has changes" in " ".join(capsys.readouterr().err.split())
+    assert kept.read_text() == '{"of": "\'t\' at v1"}\n'
