@@ -3,7 +3,7 @@
 from runtime import configuration
 from runtime.emulate import build, opened
 from tests.benchmarks.figure import Figure, timed
-from tests.faults.emulated import free_port
+from tests.ports import free_port
 
 SECOND_NS = 1_000_000_000
 

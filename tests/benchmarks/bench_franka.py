@@ -10,7 +10,8 @@ from runtime import configuration
 from runtime.assembly import Assembly
 from runtime.run import RunOptions, run
 from tests.benchmarks.figure import Figure
-from tests.faults.emulated import ROOT, free_port
+from tests.faults.emulated import ROOT
+from tests.ports import free_port
 from tests.sim_drivers.firmware.fcibench import free_host
 
 ROUNDS = 3

@@ -9,7 +9,8 @@ from drivers.rover_serial.driver import RoverBase
 from drivers.rover_serial.imu import RoverImu
 from tests.benchmarks.bench_omni_can import cpu_s
 from tests.benchmarks.figure import Figure, of_distribution
-from tests.faults.emulated import free_port, trundle, until
+from tests.faults.emulated import trundle, until
+from tests.ports import free_port
 
 TICKS, PERIOD_S = 400, 0.02
 

@@ -13,7 +13,8 @@ from runtime.emulate import CATCH_UP_NS, FreeRun
 from runtime.registry import Part, load
 from sim_drivers.firmware.firmware import FirmwareSetup
 from sim_drivers.world import MujocoWorld
-from tests.faults.emulated import GROUP, free_port
+from tests.faults.emulated import GROUP
+from tests.ports import free_port
 from tests.sim_drivers.firmware.fcibench import free_host
 
 

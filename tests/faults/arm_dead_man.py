@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from tests.faults.dead_man import Try, strike
-from tests.faults.emulated import ROOT, children, free_port, until
+from tests.faults.emulated import ROOT, children, until
+from tests.ports import free_port
 from tests.sim_drivers.firmware.fcibench import free_host
 
 SWINGING_RAD_S, STANDING_RAD_S = 1.0, 0.02

@@ -1,7 +1,6 @@
 """Worlds and runs in processes of their own, on ports that nobody else uses, and someone who watches from outside."""
 
 import os
-import random
 import socket
 import subprocess
 import sys
@@ -17,20 +16,12 @@ import can
 
 from drivers.interface.samples import TruthSample
 from drivers.interface.truth_wire import LARGEST_DATAGRAM, WATCH, decode
+from tests.ports import free_port
 
 COMMAND = "from runtime.cli import main; main()"
 GROUP = "239.74.163.2"
 PATIENCE_S = 60.0  # other work may share the machine
 ROOT = Path(__file__).parents[2]
-
-
-def free_port() -> int:
-    """Return a UDP port that is free now; drawn at random, so that two test runs hardly meet."""
-    while True:
-        port = random.SystemRandom().randrange(20_000, 60_000)
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link, suppress(OSError):
-            link.bind(("", port))
-            return port
 
 
 def until(holds: Callable[[], bool], what: str) -> None:

@@ -18,8 +18,9 @@ from sim_drivers.scenarios.square import Square, SquareSettings
 from sim_drivers.world import MujocoWorld, WorldSettings
 from tests.contract.rigs import FreeRunning, Rig
 from tests.faults.dead_man import DRIVING, Try, strike
-from tests.faults.emulated import ROOT, children, free_port, until
+from tests.faults.emulated import ROOT, children, until
 from tests.faults.told import until_told
+from tests.ports import free_port
 
 LIFETIME_NS = 250_000_000
 FULL_M_S, STANDING_M_S = 0.9, 0.02

@@ -13,9 +13,9 @@ import rerun.blueprint as rrb
 from runtime.log.exact.columns import ArrowColumn, timelines
 from runtime.log.files.live import LiveView
 from runtime.log.reading.repair import quiet_environment, rerun_program
-from runtime.log.reading.review import _free_port
 from runtime.log.recorder import Recorder
 from runtime.log.settings import LogSettings
+from tests.ports import free_port
 from tests.runtime.log_cycles import header, make_cycles
 
 MEGABYTE = np.random.default_rng(1).integers(0, 2**62, 125_000)  # does not compress
@@ -50,7 +50,7 @@ def send(view: LiveView, tick: int, values: np.ndarray) -> None:
 
 
 def test_a_stalled_viewer_costs_what_it_would_have_seen_and_nobody_waits_for_it(tmp_path: Path) -> None:
-    port = _free_port()
+    port = free_port()
     view = LiveView(port, rrb.Blueprint())
     with watcher(port, tmp_path / "a.rrd") as child:
         tick = 0
@@ -70,7 +70,7 @@ def test_a_stalled_viewer_costs_what_it_would_have_seen_and_nobody_waits_for_it(
 
 
 def test_the_log_is_whole_although_nobody_can_see_it(tmp_path: Path) -> None:
-    port = _free_port()
+    port = free_port()
     recorder = Recorder(tmp_path / "a.rrd", LogSettings(live_port=port), header(), lockstep=True, live=True)
     recorder.open()
     with watcher(port, tmp_path / "b.rrd") as child:

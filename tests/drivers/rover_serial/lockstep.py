@@ -1,6 +1,5 @@
 """A session and an emulated autopilot on one wire over loopback and one clock, stepped by the test; no process."""
 
-import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -20,16 +19,11 @@ from sim_drivers.firmware.firmware import FirmwareSetup, LockstepHost
 from sim_drivers.firmware.rover_autopilot import RoverAutopilot
 from sim_drivers.scenarios.square import Square, SquareSettings
 from sim_drivers.world import MujocoWorld, WorldSettings
+from tests.ports import free_port
 
 MS = 1_000_000
 UNIX_NS = 1_800_000_000 * 1_000_000_000
 MEMORY = MemorySpec(tuple(RINGS.values()), (), command_values=2)
-
-
-def free_port(kind: int = socket.SOCK_STREAM) -> int:
-    with socket.socket(socket.AF_INET, kind) as link:
-        link.bind(("127.0.0.1", 0))
-        return link.getsockname()[1]
 
 
 class Lockstep:
@@ -92,7 +86,7 @@ class Lockstep:
 @contextmanager
 def lockstep(firmware=None, key=None, key_file=None, their_key_file=None, scheme="tcp", **settings) -> Iterator[Lockstep]:
     world = MujocoWorld(Square(SquareSettings()).draw(0), WorldSettings())
-    url = f"{scheme}:127.0.0.1:{free_port(socket.SOCK_STREAM if scheme == 'tcp' else socket.SOCK_DGRAM)}"
+    url = f"{scheme}:127.0.0.1:{free_port()}"
     chosen = RoverSettings(**({"url": url, "signing_key": key_file, "gather_s": 0.0} | settings))
     theirs = chosen.model_copy(update={"signing_key": their_key_file or key_file})
     told = RoverAutopilot.Settings(**({"loss_probability": 0.0, "estimate_s": 0.2} | (firmware or {})))

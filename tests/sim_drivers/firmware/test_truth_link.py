@@ -23,16 +23,11 @@ from sim_drivers.firmware.firmware import FirmwareSetup, LockstepHost
 from sim_drivers.firmware.truth import EmulatedTruthFirmware
 from sim_drivers.scene import Mover, Scene, Shape
 from sim_drivers.world import MujocoWorld, WorldSettings
+from tests.ports import free_port
 
 WALK = np.array([[0.0, 3.0, 0.0, 0.0], [10.0, 13.0, 0.0, 0.0]])  # 1 m/s from the start
 SCENE = Scene("walk", SE2(), (), 10.0, (), (Mover("walker", Shape.cylinder(0.2, 1.7), WALK),))
 PATIENCE_S = 10.0
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
-        link.bind(("127.0.0.1", 0))
-        return int(link.getsockname()[1])
 
 
 class Bench:
