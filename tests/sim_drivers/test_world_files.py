@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicHermiteSpline
 
 from drivers.interface.errors import ConfigurationError
 from sim_drivers.scenarios.barn import Barn
@@ -63,6 +64,29 @@ def test_discs_go_the_ways_of_the_file_and_begin_again() -> None:
                 pose = mover.pose_at(t + round_trips * disc["period_s"])
                 np.testing.assert_allclose((pose.x, pose.y), (x, y), atol=1e-6)
     assert (scene.map_from_start.x, scene.map_from_start.y, abs(scene.map_from_start.yaw)) == (11.0, 0.0, math.pi)
+
+
+def test_between_key_frames_a_disc_follows_gazebos_spline() -> None:
+    """Held against SciPy's Hermite spline in each key frame's own time; it never turns on the spot, whose way it is not."""
+    scene, file = dynabarn(), json.loads(DYNABARN.read_text())["worlds"]["18"]
+    for mover, disc in zip(scene.movers, file, strict=True):
+        t, *places = np.array(disc["keyframes_t_x_y"]).T
+        index = np.arange(len(t))
+        # np.gradient is half of what lies between the neighbours, at the ends all of what lies to the only one.
+        slopes = [np.gradient(p) * np.r_[0.5, np.ones(len(t) - 2), 0.5] for p in places]
+        wanted = [
+            CubicHermiteSpline(index, p, slope)(np.interp(mover.keyframes[:, 0], t, index))
+            for p, slope in zip(places, slopes, strict=True)
+        ]
+        np.testing.assert_allclose(mover.keyframes[:, 1:3].T, wanted, atol=1e-9)
+        assert np.diff(mover.keyframes[:, 0]).max() <= 0.1 + 1e-9
+
+
+def test_three_walls_stand_around_the_floor_and_the_way_across_is_free() -> None:
+    scene = dynabarn()
+    across = np.stack((np.linspace(11.0, -9.0, 41), np.zeros(41)), axis=1)
+    assert clearance(scene, across).min() == pytest.approx(0.75)  # the goal lies before the back wall
+    assert clearance(scene, np.array([[0.0, 9.0], [0.0, -9.0]])) == pytest.approx([0.75, 0.75])
 
 
 def test_a_lead_that_the_seed_draws_only_turns_the_clock_forward() -> None:
