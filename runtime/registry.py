@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 import inspect
+from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
@@ -27,9 +28,15 @@ class Part(enum.Enum):
         return self.name.lower()
 
 
+@cache  # reading every installed distribution's metadata takes tens of milliseconds, and a configuration asks ten times
+def registered(part: Part) -> tuple[EntryPoint, ...]:
+    """Return what is registered for a kind of part, as it stood when this process first asked."""
+    return tuple(entry_points(group=part.value))
+
+
 def names(part: Part) -> tuple[str, ...]:
     """Return every registered name, sorted."""
-    return tuple(sorted({entry.name for entry in entry_points(group=part.value)}))
+    return tuple(sorted({entry.name for entry in registered(part)}))
 
 
 def load(part: Part, name: str) -> Any:
@@ -38,7 +45,7 @@ def load(part: Part, name: str) -> Any:
     Raises:
         ConfigurationError: nothing is registered under it, or two distributions claim it, or it cannot be imported.
     """
-    found = [entry for entry in entry_points(group=part.value) if entry.name == name]
+    found = [entry for entry in registered(part) if entry.name == name]
     if not found:
         raise unknown_name(part.noun, name, names(part))
     if len({entry.value for entry in found}) > 1:

@@ -116,6 +116,8 @@ def _ramped(value: BodyTwist, target: BodyTwist, limits: BaseLimits, dt_s: float
 
 def _approach(value: float, target: float, step_up: float, step_down: float) -> float:
     """Move a step towards the target: `step_up` away from rest, `step_down` towards rest, but never through it."""
+    if value == target:
+        return target
     if value * target < 0.0:
         target = 0.0
     step = step_down if abs(target) < abs(value) else step_up

@@ -72,19 +72,28 @@ class Mover:
 
     def pose_at(self, time_s: float) -> SE2:
         """Return the pose in the map at a time of the run."""
-        t = self._wrapped(time_s)
-        k = self.keyframes
-        x, y, yaw = (float(np.interp(t, k[:, 0], k[:, column])) for column in (1, 2, 3))
+        low, high, t = self._around(time_s)
+        if low is high:
+            return SE2(*low[1:])
+        span, since = high[0] - low[0], t - low[0]
+        x, y, yaw = ((h - v) / span * since + v for v, h in zip(low[1:], high[1:], strict=True))
         return SE2(x, y, yaw)
 
     def velocity_at(self, time_s: float) -> tuple[float, float]:
         """Return the velocity of the centre in the map [m/s]; at a key frame, of what follows."""
-        t, k = self._wrapped(time_s), self.keyframes
-        after = int(np.searchsorted(k[:, 0], t, side="right"))
-        if after == 0 or after == len(k):
+        low, high, _ = self._around(time_s)
+        if low is high:
             return (0.0, 0.0)
-        step = k[after] - k[after - 1]
-        return (float(step[1] / step[0]), float(step[2] / step[0]))
+        span = high[0] - low[0]
+        return ((high[1] - low[1]) / span, (high[2] - low[2]) / span)
+
+    def _around(self, time_s: float) -> tuple[list[float], list[float], float]:
+        """Return the key frames before and after a time, one and the same before the first and after the last, and the time."""
+        t, frames = self._wrapped(time_s), self.keyframes
+        after = int(frames[:, 0].searchsorted(t, side="right"))
+        before = max(after - 1, 0)
+        low = frames[before].tolist()
+        return low, low if after in (0, len(frames)) else frames[after].tolist(), t
 
     def _wrapped(self, time_s: float) -> float:
         start, end = float(self.keyframes[0, 0]), float(self.keyframes[-1, 0])

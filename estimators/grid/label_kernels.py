@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
@@ -48,21 +49,23 @@ def _trace_free(occupied: Occupied, label: U8, row0: int, column0: int, row1: in
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _touches(occupied: Occupied, row: int, column: int) -> bool:
-    """Tell whether the cell or one of its eight neighbours is occupied."""
-    for r in range(max(row - 1, 0), min(row + 2, occupied.shape[0])):
-        for c in range(max(column - 1, 0), min(column + 2, occupied.shape[1])):
-            if occupied[r, c]:
-                return True
-    return False
+def touching(occupied: Occupied) -> U8:
+    """Return 1 for every cell that is occupied or has an occupied one among its eight neighbours, shape (rows, columns)."""
+    rows, columns = occupied.shape
+    touches = np.zeros((rows, columns), np.uint8)
+    for row in range(rows):
+        for column in range(columns):
+            if occupied[row, column]:
+                touches[max(row - 1, 0) : min(row + 2, rows), max(column - 1, 0) : min(column + 2, columns)] = 1
+    return touches
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def is_hidden(occupied: Occupied, row0: int, column0: int, row1: int, column1: int) -> bool:
+def is_hidden(occupied: Occupied, touches: U8, row0: int, column0: int, row1: int, column1: int) -> bool:
     """Tell whether another surface stands between the camera's cell (row0, column0) and the cell (row1, column1).
 
     A surface seen at a shallow angle does not hide itself: a line must have left the first surface, by at least one cell
-    that does not touch an occupied one, before what follows counts as behind it.
+    that does not touch an occupied one (`touching`), before what follows counts as behind it.
     """
     rows, columns = abs(row1 - row0), abs(column1 - column0)
     up, right = (1 if row1 > row0 else -1), (1 if column1 > column0 else -1)
@@ -71,7 +74,7 @@ def is_hidden(occupied: Occupied, row0: int, column0: int, row1: int, column1: i
     while row != row1 or column != column1:
         if occupied[row, column]:
             met = True
-        elif met and not _touches(occupied, row, column):
+        elif met and not touches[row, column]:
             return True
         row, column, error = _step(row, column, error, rows, columns, up, right)
     return False
@@ -90,9 +93,10 @@ def label_cells(occupied: Occupied, hits: Counts, free_ends: U8, row0: int, colu
         for column in range(label.shape[1]):
             if hits[row, column] > 0 or free_ends[row, column]:
                 _trace_free(occupied, label, row0, column0, row, column, free_ends[row, column] != 0)
+    touches = touching(occupied)
     for row in range(label.shape[0]):
         for column in range(label.shape[1]):
             if occupied[row, column]:
                 label[row, column] = OCCUPIED
-            if label[row, column] != UNKNOWN and is_hidden(occupied, row0, column0, row, column):
+            if label[row, column] != UNKNOWN and is_hidden(occupied, touches, row0, column0, row, column):
                 label[row, column] = UNKNOWN

@@ -18,7 +18,7 @@ from planners.polyline import arc_length, resample
 from planners.router import Route, RouterSetup, goal_yaw
 from planners.routers.grid_costs import CostGrid, GridCosts, cost_grid
 from planners.routers.grid_graph import GridGraph, trace
-from planners.routers.grid_kernels import pull_straight
+from planners.routers.grid_kernels import near_cells, pull_straight
 from planners.routers.window import remainder_outside, ring
 
 F64 = NDArray[np.float64]
@@ -48,6 +48,7 @@ class GridRouter:
     def warm_up(self) -> None:
         """Compile the path kernel."""
         pull_straight(np.zeros((2, 2)), np.ones((2, 2)))
+        near_cells(np.zeros(1, np.int64), np.zeros(1, np.int64), 1, 2, 2)
         static_field.warm_up(frozen_array(np.zeros((2, 2), np.uint8)))
 
     def route(self, belief: Belief, mission: Mission) -> Route:
@@ -99,12 +100,7 @@ class GridRouter:
             return grid.cost
         lattice, reach = grid.lattice, int(self._settings.loyalty_radius_m / grid.lattice.cell_m)
         rows, columns = lattice.cell_of(self._last)
-        near = np.zeros(grid.cost.shape, dtype=np.bool_)
-        for down in range(-reach, reach + 1):
-            for right in range(-reach, reach + 1):
-                r, c = rows + down, columns + right
-                inside = (r >= 0) & (r < lattice.rows) & (c >= 0) & (c < lattice.columns)
-                near[r[inside], c[inside]] = True
+        near = near_cells(rows, columns, reach, lattice.rows, lattice.columns)
         return np.where(near, grid.cost * (1.0 - self._settings.loyalty), grid.cost)
 
 

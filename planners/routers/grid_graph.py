@@ -31,7 +31,8 @@ class GridGraph:
         order = np.lexsort((head, tail))
         self._tail, self._head = tail[order], head[order]
         self._half_length = 0.5 * np.concatenate(lengths)[order]
-        self._row_start = np.searchsorted(self._tail, np.arange(rows * columns + 1)).astype(np.int32)
+        row_start = np.searchsorted(self._tail, np.arange(rows * columns + 1)).astype(np.int32)
+        self._graph = csr_array((self._half_length.copy(), self._head, row_start), shape=(rows * columns, rows * columns))
 
     def search(self, cost: F64, start: int) -> tuple[F64, I32]:
         """Return the cheapest cost from `start` to every node and each node's predecessor, shapes (nodes,).
@@ -41,10 +42,9 @@ class GridGraph:
             start: node number.
         """
         flat = cost.ravel()
-        weight = self._half_length * (flat[self._tail] + flat[self._head])
-        nodes = flat.size
-        graph = csr_array((weight, self._head, self._row_start), shape=(nodes, nodes))
-        distance, predecessor = dijkstra(graph, directed=True, indices=[start], return_predecessors=True)
+        weight = np.add(flat[self._tail], flat[self._head], out=self._graph.data)
+        weight *= self._half_length
+        distance, predecessor = dijkstra(self._graph, directed=True, indices=[start], return_predecessors=True)
         return distance[0], np.asarray(predecessor[0], dtype=np.int32)
 
 

@@ -1,4 +1,4 @@
-"""Pulling the staircase of a grid path straight."""
+"""Pulling the staircase of a grid path straight, and the cells along one."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 F64 = NDArray[np.float64]
+I64 = NDArray[np.int64]
+Bool = NDArray[np.bool_]
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -48,3 +50,14 @@ def pull_straight(path: F64, cost: F64) -> F64:
         count += 1
         here = there
     return path[kept[:count]]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def near_cells(path_rows: I64, path_columns: I64, reach: int, rows: int, columns: int) -> Bool:
+    """Return which cells lie within `reach` cells, up or across, of a cell of the path, (n,) each; shape (rows, columns)."""
+    near = np.zeros((rows, columns), np.bool_)
+    for i in range(len(path_rows)):
+        for row in range(max(path_rows[i] - reach, 0), min(path_rows[i] + reach + 1, rows)):
+            for column in range(max(path_columns[i] - reach, 0), min(path_columns[i] + reach + 1, columns)):
+                near[row, column] = True
+    return near

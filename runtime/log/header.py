@@ -6,6 +6,7 @@ import platform
 import re
 import subprocess
 from dataclasses import dataclass
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Literal
@@ -71,6 +72,7 @@ def code_version() -> tuple[str, bool]:
     return version.removesuffix("-dirty"), version.endswith("-dirty")
 
 
+@cache
 def library_versions() -> tuple[str, ...]:
     """Return "name version" of every library that a run needs, as this distribution's own metadata lists them."""
     needed = (text for text in metadata.requires("trundle") or () if "extra ==" not in text)
@@ -84,6 +86,7 @@ def machine() -> str:
     return f"{processor()}; {system}"
 
 
+@cache
 def processor() -> str:
     """Return the processor's model as the system names it, else its architecture."""
     try:

@@ -89,11 +89,11 @@ def test_a_run_that_was_killed_replays_as_far_as_it_was_recorded(tmp_path: Path,
 def test_a_planner_that_is_not_installed_is_named(
     log: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def without_dwa(group: str) -> tuple[EntryPoint, ...]:
-        return tuple(entry for entry in entry_points(group=group) if entry.name != "dwa")
+    def without_dwa(part: registry.Part) -> tuple[EntryPoint, ...]:
+        return tuple(entry for entry in entry_points(group=part.value) if entry.name != "dwa")
 
     assert replay(log, ReplayOptions(last=2)).planner == "dwa"
-    monkeypatch.setattr(registry, "entry_points", without_dwa)
+    monkeypatch.setattr(registry, "registered", without_dwa)
     code, said = replayed(capsys, log)
     assert code == 2
     assert "unknown planner 'dwa'" in said
