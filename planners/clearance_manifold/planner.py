@@ -39,6 +39,8 @@ from planners.planner import Plan, PlannerSetup
 from planners.polyline import arc_length
 from planners.router import Route
 
+TURN_M = 0.6  # a route that leads back within so much turns back
+
 
 class ClearanceManifold:
     """Clearance manifold: follows the ridge of the clearance that will be there on arrival, continued from frame to frame."""
@@ -132,7 +134,7 @@ class ClearanceManifold:
             self._arc_m = float(self._chart.project(point[None], self._arc_m)[0, 0])
             if moved_m < 0.05 and not self._escapes(self._chart, route.path_in_odom):
                 return False
-        behind = self._behind(point)
+        behind = self._behind(point, route.path_in_odom)
         self._chart = lay_chart(route.path_in_odom, goal, behind, self._settings.chart)
         self._arc_m = float(self._chart.project(point[None])[0, 0])
         self._tracker.rechart(self._chart)
@@ -145,12 +147,19 @@ class ClearanceManifold:
         offset_m = chart.project(near, self._arc_m, reach_m + 1.0)[:, 1]
         return bool((np.abs(offset_m) > self._settings.chart.escape_m).any())
 
-    def _behind(self, point: F64) -> F64:
-        """Return the centre line behind the robot, for a new chart to join, shape (n, 2)."""
+    def _behind(self, point: F64, path: F64) -> F64:
+        """Return the centre line behind the robot, for a new chart to join, shape (n, 2).
+
+        None where the route, shape (m, 2), turns back: smoothed, such a chart is a hairpin whose tip lies behind the robot and
+        whose tangent there leads anywhere.
+        """
+        nothing = np.zeros((0, 2))
         if self._chart is None:
-            return np.zeros((0, 2))
+            return nothing
         arcs = np.arange(self._arc_m - self._settings.solver.rear_m, self._arc_m - 0.3, 0.1)
-        return self._chart.frames(arcs, 1.0)[0]
+        behind = self._chart.frames(arcs, 1.0)[0]
+        onward = path[np.searchsorted(arc_length(path), TURN_M, side="right") - 1] - point
+        return behind if float(onward @ (point - behind[-1])) >= 0.0 else nothing
 
     def _scene(self, chart: Chart, predicted: Predicted, belief: Belief, point: F64) -> Scene:
         lattice, s = belief.clearance.lattice, self._settings.solver

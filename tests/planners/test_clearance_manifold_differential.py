@@ -89,3 +89,14 @@ def test_who_cannot_look_aside_while_it_drives_stands_to_look_and_creeps_then(mo
     assert (plan.base.vx > 0.0) == creeps
     if aside:
         assert plan.base.wz > 0.3
+
+
+@pytest.mark.parametrize("aside_m", [0.6, -0.6])
+def test_where_the_route_turns_back_the_base_turns_on_the_spot_and_goes(aside_m):
+    """A chart joined to the way it came would be a hairpin, smoothed to a tip behind it whose tangent leads anywhere."""
+    planner, base = planner_of(LIMITS), Base(SE2(1.0, 0.1, 0.0))
+    for tick in range(60):
+        goal = (9.0, 0.0) if tick < 3 else (-3.0, aside_m)
+        base.step(planner.plan(*routed(at(tick, pose=base.pose, twist=base.last), goal)).base)
+    assert math.cos(base.pose.yaw) < -0.9
+    assert base.pose.x < 0.75
