@@ -79,7 +79,7 @@ class ManifoldController:
         if at.feasible and speed + float(push @ tangent) < self._settings.progress_m_s:
             speed = min(self._settings.progress_m_s, self._brakable(min(at.free_m, at.clear_m)))
         if not self._limits.holonomic:
-            along = body.inverse().apply(push + speed * tangent)
+            along = body.inverse().apply(push + speed * tangent) if speed > STANDSTILL_M_S else np.zeros(2)
             u = self._yielding(along, at)
             behind_m = at.behind_m if np.any(u != along) else 0.0  # only who gives way backs off
             return self._differential.twist(body.apply(u), speed, wrap_angle(at.heading_rad - yaw), behind_m), speed
@@ -90,6 +90,13 @@ class ManifoldController:
         u = body.apply(self._smoothed(along, at, around, least_m_s3, pass_s))
         vx, vy = within(float(u[0]), float(u[1]), low_x, cap.vx, cap.vy)
         return BodyTwist(max(vx, low_x, -cap.vx if self._limits.reverse else 0.0), vy, self.turn(at, yaw)), k
+
+    def step(self, u: F64, yaw: float, behind_m: float) -> BodyTwist:
+        """Return the twist that moves the base with a velocity u, shape (2,), in odom, or turns it there; it may back off."""
+        body = SE2(0.0, 0.0, -yaw).apply(u)
+        if not self._limits.holonomic:
+            return self._differential.twist(body, float(np.hypot(*u)), 0.0, behind_m)
+        return BodyTwist(float(body[0]), float(body[1]), 0.0)
 
     def _push(self, error: F64, jerk_m_s3: float) -> F64:
         """Return equation 4's velocity towards the manifold, shape (2,), in odom, if it can still end there with that jerk."""

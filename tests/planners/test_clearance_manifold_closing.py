@@ -51,7 +51,10 @@ def test_what_was_taken_in_goes_on_from_a_snapshot():
 
 def apart_at(xs, closing):
     sections = Sections(
-        np.stack((np.array(xs), np.zeros(len(xs))), axis=1), np.tile([0.0, 1.0], (len(xs), 1)), np.zeros((len(xs), 2))
+        np.stack((np.array(xs), np.zeros(len(xs))), axis=1),
+        np.tile([0.0, 1.0], (len(xs), 1)),
+        np.zeros((len(xs), 2)),
+        np.full((len(xs), 1, 2), np.nan),
     )
     return encounters(sections, OFFSETS, np.zeros(2), 0.5, 3.0, np.array([*closing, 20.0]))
 
