@@ -7,6 +7,7 @@ that slopes and rates give is weighed against how the boundary's middle really m
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -17,9 +18,10 @@ from estimators.field_query import sample
 
 FREE_AROUND_M = 0.45  # a place in view with so much clearance is nobody's
 SURE_S = 0.3  # what was seen to close in for less is the noise of a rate
-SLOW_M_S = 0.45  # the rates of a wall seen while turning look like this; nobody so slow is dangerous out of view
+SURE = 2.0  # and so is a velocity of less than so many standard deviations: a wall seen while turning has rates, too
 MIDDLE_M = 0.08  # noise of a boundary's middle
 RATE_M_S = 0.5  # and of the velocity that its rates give,
+FASTEST_M_S = 1.5  # and nobody walks faster: what comes into view has any rate
 RATE_S = 0.56  # which are the same for so long: the smoothing of the field rate
 SWERVE_M_S = 0.5  # by which its velocity wanders in a second
 STILL_M_S = 0.15  # what moves no faster does not close in
@@ -42,11 +44,12 @@ class ClosingMemory:
         Args:
             found: what is seen to, shape (5,); its last element is 0 where nothing does.
             field: the clearance now.
-            age_s: since each of its cells was in view, shape (rows, columns).
+            age_s: since each of its cells was looked at, shape (rows, columns).
             elapsed_s: since the last time.
         """
         self._kept[:2] += elapsed_s * self._kept[2:4]
         if found[4] > 0.0:
+            found = np.concatenate((found[:2], _walked(found[2:4]), found[4:]))
             same = self._kept[4] > 0.0 and np.hypot(*(found[:2] - self._kept[:2])) < SAME_M
             if same:
                 self._weigh(found, elapsed_s)
@@ -59,8 +62,8 @@ class ClosingMemory:
         there = self._kept[None, :2]
         seen = float(sample(age_s, field.lattice, there)[0]) == 0.0
         free = float(sample(field.clearance_m, field.lattice, there)[0]) > FREE_AROUND_M
-        slow = float(np.hypot(*self._kept[2:4])) < SLOW_M_S
-        if slow or self._seen_s < SURE_S or self._unseen_s > self._carry_s or (seen and free):
+        unsure = self._seen_s < SURE_S or float(np.hypot(*self._kept[2:4])) < SURE * math.sqrt(self._spread[2])
+        if unsure or self._unseen_s > self._carry_s or (seen and free):
             self._kept, self._seen_s = np.zeros(5), 0.0
         return self._kept.copy()
 
@@ -90,3 +93,8 @@ class ClosingMemory:
         self._kept = state["closing"][:5].copy()
         self._spread = state["closing"][5:8].copy()
         self._seen_s, self._unseen_s = state["closing"][8:].tolist()
+
+
+def _walked(velocity: F64) -> F64:
+    """Return a velocity, shape (2,), no faster than anybody walks."""
+    return np.asarray(velocity * min(1.0, FASTEST_M_S / max(float(np.hypot(*velocity)), 1e-9)))

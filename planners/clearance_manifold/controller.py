@@ -14,7 +14,7 @@ from estimators.belief import F64
 from planners.clearance_manifold.control_kernels import brakable, give_way, known_way, longitudinal
 from planners.clearance_manifold.differential import Differential
 from planners.clearance_manifold.governor import Around, Governor, Motion, approach
-from planners.clearance_manifold.governor_kernels import time_to_pass
+from planners.clearance_manifold.governor_kernels import room_along, time_to_pass
 from planners.clearance_manifold.settings import ControllerSettings
 from planners.point_ds.kernels import within
 
@@ -23,6 +23,7 @@ SEEN_AHEAD_M = 0.6  # enough to brake from the caps
 STANDSTILL_M_S = 0.01
 LEAD_S = 0.4  # the robot is out of the way so long before somebody passes: he is as wide as he is, and so is it
 NEAR_M = 1.0  # who passes at more than this does not press
+BACK_OFF_M = 0.3  # with less room behind, what is too near to be seen is driven over as it was seen last
 APPROACH = 0.25  # of the jerk, on the way to the manifold: the rest is left for what else happens
 
 
@@ -44,6 +45,7 @@ class Situation:
     velocity: F64  # (2,), of the base, in odom
     closing: F64  # (5,), what closes in
     behind_m: float = 0.0  # how far a base that cannot strafe may back off
+    stale: bool = False  # nobody has looked at the ground right before it for long
 
 
 class ManifoldController:
@@ -86,6 +88,8 @@ class ManifoldController:
         low_x = -cap.vx if self._limits.reverse else -1e-9
         push_x, push_y = within(float(push[0]), float(push[1]), low_x, cap.vx, cap.vy)
         k = longitudinal(push_x, push_y, float(tangent[0]), float(tangent[1]), speed, cap.vx, cap.vy, min(low_x, 0.0))
+        if at.stale and self._can_back_off(at, around):
+            k = -self._settings.progress_m_s if k > self._settings.progress_m_s else 0.0
         along = body.inverse().apply(np.array([push_x, push_y]) + k * tangent)
         u = body.apply(self._smoothed(along, at, around, least_m_s3, pass_s))
         vx, vy = within(float(u[0]), float(u[1]), low_x, cap.vx, cap.vy)
@@ -115,6 +119,11 @@ class ManifoldController:
         return self._governor.follow(
             yielding, Motion(at.robot, at.velocity, at.tangent, at.free_m, at.clear_m), around, least_m_s3
         )
+
+    def _can_back_off(self, at: Situation, around: Around) -> bool:
+        """Return whether there is room behind, to see what is too near."""
+        room_m = room_along(around.ground, around.known, at.robot, -at.tangent, around.least_m, around.body_m, BACK_OFF_M)
+        return bool(room_m >= BACK_OFF_M)
 
     def _brakable(self, free_m: float) -> float:
         return float(brakable(free_m, self._settings.deceleration_m_s2, self._delay_s))

@@ -59,7 +59,7 @@ class ClearanceManifold:
             raise ConfigurationError("planner.name 'clearance_manifold' drives a base, but the robot has none")
         self._settings, self._setup, self._limits = settings, setup, setup.limits
         self._stations = Stations.of(settings.solver)
-        self._field = ArrivalField(settings.prediction)
+        self._field = ArrivalField(settings.prediction, setup.robot_radius_m)
         self._solver = Solver(settings.solver, settings.tracker, self._stations, setup)
         self._tracker = Tracker(settings.tracker, settings.solver, self._solver, self._stations, setup.period_s)
         self._reader = Reader(settings, self._stations, self._solver.least_m, strafes=setup.limits.holonomic)
@@ -94,7 +94,7 @@ class ClearanceManifold:
         told = self._tracker.advance(scene, belief, new_goal)
         outlook = self._outlook(scene, told, belief)
         left_m = self._chart.length_m - self._arc_m
-        situation = self._reader.situation(told.manifold, belief, point, left_m, predicted.closing, outlook)
+        situation = self._reader.situation(told.manifold, belief, point, left_m, predicted.closing, outlook, self._field.met_s)
         around = Around(scene.ground, belief.clearance.known, self._solver.least_m, self._settings.controller.body_m)
         twist, speed = self._controller.command(situation, pose.yaw, around)
         return self._plan(scene, told, situation, outlook, (twist, speed))

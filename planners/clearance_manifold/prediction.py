@@ -35,11 +35,12 @@ class Predicted:
 class ArrivalField:
     """Predicts the field, and remembers when each cell was last in view (section 4.1)."""
 
-    def __init__(self, settings: PredictionSettings) -> None:
-        """Start with nothing seen."""
-        self._settings = settings
+    def __init__(self, settings: PredictionSettings, radius_m: float) -> None:
+        """Start with nothing seen; what is within the robot's radius it stands on."""
+        self._settings, self._radius_m = settings, radius_m
         self._lattice: Lattice | None = None
         self._age_s: F32 = np.zeros((0, 0), np.float32)
+        self._met_s: F32 = np.zeros((0, 0), np.float32)
         self._stamp_ns = 0
         self._closing = ClosingMemory(settings.carry_s)
         self._recent = RecentRate()
@@ -48,7 +49,7 @@ class ArrivalField:
         """Compile the kernels, on read-only arrays as a belief's are."""
         field, known = frozen_array(np.ones((3, 3), np.float32)), frozen_array(np.ones((3, 3), np.bool_))
         age_s = np.zeros((3, 3), np.float32)
-        observe(age_s, known, np.zeros(2), 1.0, np.zeros(3), 1.0, 1.0, 0.0)
+        observe(age_s, known, np.zeros(2), 1.0, np.zeros(3), 1.0, (0.0, 0.0, 1.0), 0.0)
         taken = taken_on_arrival(field, field, age_s, np.zeros(2), 1.0, np.zeros(2), self._arrival(0.0))
         lowered(field, taken, 1.0)
         nearest_closing(field, field, age_s, np.zeros(2), 1.0, np.zeros(2), CLOSING_M_S)
@@ -65,13 +66,18 @@ class ArrivalField:
         closing = nearest_closing(field.clearance_m, field.rate_m_s, recent, corner, cell_m, robot, CLOSING_M_S)
         if closing[4] < LEAST_CELLS:
             closing[4] = 0.0
-        closing = self._closing.update(closing, field, self._age_s, elapsed_s)
+        closing = self._closing.update(closing, field, self._met_s, elapsed_s)
         return Predicted(lowered(field.clearance_m, taken, cell_m), closing)
 
     @property
     def age_s(self) -> F32:
-        """How long ago each cell was last in view [s], shape (rows, columns)."""
+        """How long ago each cell was last in view, or too near for that [s], shape (rows, columns)."""
         return self._age_s
+
+    @property
+    def met_s(self) -> F32:
+        """The same without what is too near: how long ago it was looked at or stood on [s], shape (rows, columns)."""
+        return self._met_s
 
     def _arrival(self, speed_m_s: float) -> Arrival:
         s = self._settings
@@ -82,26 +88,32 @@ class ArrivalField:
         """Let what is in view be new and the rest grow older; return by how much [s]."""
         field, pose = belief.clearance, belief.odom_from_base
         elapsed_s = max(0.0, (belief.stamp_ns - self._stamp_ns) / SECOND_NS) if self._lattice is not None else 0.0
-        self._age_s = _carried(self._age_s, self._lattice, field)
+        self._age_s, self._met_s = (_carried(age_s, self._lattice, field) for age_s in (self._age_s, self._met_s))
+        if self._lattice is None:
+            self._met_s[:] = 0.0  # where it is put down, somebody has looked
         self._lattice, self._stamp_ns = field.lattice, belief.stamp_ns
         corner = np.array([field.lattice.x_m, field.lattice.y_m])
-        s = self._settings
-        observe(
-            self._age_s, field.known, corner, field.lattice.cell_m, np.array([pose.x, pose.y, pose.yaw]),
-            math.radians(0.5 * s.fov_deg), s.range_m, elapsed_s,
-        )  # fmt: skip
+        s, at = self._settings, np.array([pose.x, pose.y, pose.yaw])
+        half_rad, cell_m = math.radians(0.5 * s.fov_deg), field.lattice.cell_m
+        for age_s, near_m in ((self._age_s, 0.0), (self._met_s, s.near_m)):
+            observe(age_s, field.known, corner, cell_m, at, half_rad, (self._radius_m, near_m, s.range_m), elapsed_s)
         return elapsed_s
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Return what is remembered, as named arrays."""
         at = self._lattice
         corner = np.zeros(0) if at is None else np.array([at.x_m, at.y_m, at.cell_m])
-        ages = {"age_corner": corner, "age_s": self._age_s, "age_stamp_ns": np.array([self._stamp_ns], np.int64)}
+        ages = {
+            "age_corner": corner,
+            "age_s": self._age_s,
+            "met_s": self._met_s,
+            "age_stamp_ns": np.array([self._stamp_ns], np.int64),
+        }
         return ages | self._closing.state() | self._recent.state()
 
     def take(self, state: dict[str, NDArray[Any]]) -> None:
         """Take over what `state` gave."""
-        self._age_s = np.asarray(state["age_s"], np.float32)
+        self._age_s, self._met_s = (np.asarray(state[name], np.float32) for name in ("age_s", "met_s"))
         corner = state["age_corner"].tolist()
         self._lattice = Lattice(*corner, *self._age_s.shape) if corner else None
         self._stamp_ns = int(state["age_stamp_ns"][0])

@@ -23,16 +23,22 @@ class Arrival(NamedTuple):
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def observe(
-    age_s: F32, known: Mask, corner: F64, cell_m: float, pose: F64, half_fov_rad: float, range_m: float, dt_s: float
-) -> None:
-    """Let observations, shape (rows, columns) [s], grow older by dt_s, and those in the sector of view be new."""
+    age_s: F32, known: Mask, corner: F64, cell_m: float, pose: F64, half_fov_rad: float, ranges_m: tuple[float, float, float],
+    dt_s: float,
+) -> None:  # fmt: skip
+    """Let observations, shape (rows, columns) [s], grow older by dt_s, and those in the sector of view be new.
+
+    `ranges_m` are the ground that the robot stands on, where the sector begins, and where it ends.
+    """
+    body_m, near_m, range_m = ranges_m
     cosine, c, s = np.cos(half_fov_rad), np.cos(pose[2]), np.sin(pose[2])
     for row in range(age_s.shape[0]):
         y = corner[1] + (row + 0.5) * cell_m - pose[1]
         for column in range(age_s.shape[1]):
             x = corner[0] + (column + 0.5) * cell_m - pose[0]
             distance2 = x * x + y * y
-            seen = known[row, column] and distance2 <= range_m * range_m and c * x + s * y >= cosine * np.sqrt(distance2)
+            seen = near_m * near_m <= distance2 <= range_m * range_m and c * x + s * y >= cosine * np.sqrt(distance2)
+            seen = known[row, column] and (seen or distance2 <= body_m * body_m)
             age_s[row, column] = np.float32(0.0) if seen else age_s[row, column] + np.float32(dt_s)
 
 

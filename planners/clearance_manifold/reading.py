@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from drivers.interface.geometry import SE2, wrap_angle
-from estimators.belief import F64, Belief
+from estimators.belief import F32, F64, Belief
 from estimators.field_query import sample
 from planners.clearance_manifold.control_kernels import known_length
 from planners.clearance_manifold.controller import UNKNOWN_GAP_M, Situation
@@ -31,7 +31,7 @@ class Reader:
         self._settings, self._stations, self._least_m, self._strafes = settings, stations, least_m, strafes
 
     def situation(
-        self, manifold: Manifold, belief: Belief, point: F64, left_m: float, closing: F64, outlook: Outlook
+        self, manifold: Manifold, belief: Belief, point: F64, left_m: float, closing: F64, outlook: Outlook, met_s: F32
     ) -> Situation:
         """Return what the controller needs.
 
@@ -42,6 +42,7 @@ class Reader:
             left_m: to the end of the chart, the goal.
             closing: what closes in, shape (5,).
             outlook: what unseen walkers leave of the way.
+            met_s: how long ago each cell was looked at, shape (rows, columns).
         """
         own, s = self._stations.own, self._settings.controller
         tangent = manifold.tangent()
@@ -50,7 +51,8 @@ class Reader:
         near = clearance[manifold.arcs_m[manifold.ahead] <= manifold.arcs_m[own] + s.heading_look_ahead_m]
         look = max(2, int(np.searchsorted(self._stations.arcs_m[own:], s.heading_look_ahead_m)) + 1)
         along_rad = heading(manifold.points[own : own + look])
-        heading_rad = self._look(along_rad, closing, point, outlook.look_at)
+        stale = self._strafes and self._stale(manifold, belief, met_s)
+        heading_rad = self._look(along_rad, closing, point, None if stale else outlook.look_at)
         stands = not self._strafes and outlook.creeps and self._looks_first(heading_rad, along_rad, belief.odom_from_base.yaw)
         watched = closing[4] > 0.0 and float(np.hypot(*(closing[:2] - point))) < WATCH_M
         if outlook.glance_rad is not None and not watched:
@@ -70,7 +72,17 @@ class Reader:
             velocity=SE2(0.0, 0.0, belief.odom_from_base.yaw).apply(np.array([belief.twist.vx, belief.twist.vy])),
             closing=closing,
             behind_m=0.0 if self._strafes else self.behind(belief),
+            stale=stale,
         )
+
+    def _stale(self, manifold: Manifold, belief: Belief, met_s: F32) -> bool:
+        """Return whether the ground right before the robot, which is too near to be seen, was not looked at for long."""
+        near_m, lattice = self._settings.prediction.near_m, belief.clearance.lattice
+        corner, way = np.array([lattice.x_m, lattice.y_m]), np.empty((2, 2))
+        way[0], tangent = manifold.points[manifold.own], manifold.tangent()
+        way[1] = way[0] + (near_m + lattice.cell_m) * tangent
+        met = met_s <= self._settings.controller.stale_s
+        return bool(known_length(met, corner, lattice.cell_m, way, self._least_m, lattice.cell_m) < near_m)
 
     def _looks_first(self, heading_rad: float, along_rad: float, yaw: float) -> bool:
         """Return whether there is something to look at aside, and the base has not turned to it yet."""

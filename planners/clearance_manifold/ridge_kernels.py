@@ -14,6 +14,7 @@ _FINE = 5  # samples of a tube, to either side
 BODY_M = 0.25  # from the middle of a boundary that closes in to its sides
 NARROW = 5.0  # cost of a station where the shield would stop; less, the nearer it is to ample
 EARLY = 0.7  # of the time to a place: the robot may be there so early
+STEEP = 2.0  # no branch is steeper: from one station to the next it would lead through what stands between them
 AWAY = 4.0  # cost of a squared distance between the robot and its own station, per square metre
 
 
@@ -232,23 +233,25 @@ def cheapest_branch(costs: F64, offsets: F64, spacing_m: F64, start: float, turn
     """Return the branch that costs least, shape (n,) [m], and what it costs.
 
     A station's best offset taken alone would hop between the two sides of an obstacle from one station to the next; so the
-    branch is chosen as a whole, by dynamic programming over stations and offsets.
+    branch is chosen as a whole, by dynamic programming over stations and offsets, no steeper than `STEEP`.
 
     Args:
         costs: of every station and offset, shape (n, m).
-        offsets: shape (m,).
+        offsets: evenly spaced, shape (m,), m > 1.
         spacing_m: between stations, shape (n - 1,).
         start: offset of the robot at the first station.
         turn: cost of a squared slope, per metre.
     """
     n, m = costs.shape
     total, came = np.empty((n, m)), np.zeros((n, m), np.int64)
+    apart_m = (offsets[m - 1] - offsets[0]) / (m - 1)
     for j in range(m):
         total[0, j] = costs[0, j] + AWAY * (offsets[j] - start) ** 2
     for i in range(1, n):
+        most = max(1, int(STEEP * spacing_m[i - 1] / apart_m))
         for j in range(m):
             best, before = np.inf, 0
-            for k in range(m):
+            for k in range(max(0, j - most), min(m, j + most + 1)):
                 step = offsets[j] - offsets[k]
                 value = total[i - 1, k] + turn * step * step / spacing_m[i - 1]
                 if value < best:

@@ -20,6 +20,9 @@ class PredictionSettings(Settings):
     speed_floor_m_s: float = Field(default=0.05, gt=0.0, le=1.0, description="v_exec,floor: the least speed they are expected at")
     fov_deg: float = Field(default=120.0, gt=0.0, le=360.0, description="what the camera sees, for the confidence")
     range_m: float = Field(default=2.5, gt=0.1, le=20.0, description="how far it sees")
+    near_m: float = Field(
+        default=0.46, ge=0.0, le=2.0, description="and from how far on: the robot's middle to what its depth image begins with"
+    )
     carry_s: float = Field(
         default=1.5, ge=0.0, le=10.0, description="what closes in is reckoned with for so long after it left the view"
     )
@@ -109,6 +112,12 @@ class ControllerSettings(Settings):
     )
     progress_m_s: float = Field(default=0.10, ge=0.0, le=1.0, description="v_min,progress: anti-freeze floor along the manifold")
     body_m: float = Field(default=0.25, ge=0.0, le=2.0, description="kept from the unknown; nearer cells are stood on already")
+    stale_s: float = Field(
+        default=4.0,
+        gt=0.5,
+        le=3600.0,
+        description="ground before a base that can strafe, not looked at for so long, is looked at first",
+    )
     arrival_m: float = Field(default=0.05, gt=0.0, le=1.0, description="this near the goal it stands")
     look_ahead_m: float = Field(
         default=0.2, gt=0.01, le=2.0, description="of a base that cannot strafe: the point that is controlled"

@@ -71,6 +71,7 @@ class Tracker:
         self._point: F64 = np.zeros(2)  # that follows the manifold
         self._stamp_ns = 0
         self._looked_ns = 0
+        self._doubted = False  # another branch was better when it was looked at last; it is taken when it still is
 
     @property
     def tube_m(self) -> float:
@@ -102,6 +103,7 @@ class Tracker:
             manifold, duals, converged, trigger = self._continue(scene, prior, max(elapsed_s, self._period_s), belief.stamp_ns)
             category = Category.NONE if manifold is not None else Category.REGULAR
         if manifold is None:
+            self._doubted = False
             keep = prior if category is Category.REGULAR else None
             manifold = self._solver.extract(scene, keep)
             duals = np.zeros(len(scene.arcs_m))
@@ -146,10 +148,11 @@ class Tracker:
             return None, duals, converged, "tangents disagree"
         least = float(manifold.clearance_m[manifold.ahead].min()) if manifold.valid else 0.0
         pressed = least < self._solver.least_m + PRESSED_M
-        wait_s = PRESSED_S if pressed else self._solver_settings.skip_s
+        wait_s = PRESSED_S if pressed or self._doubted else self._solver_settings.skip_s
         if stamp_ns - self._looked_ns >= round(wait_s * SECOND_NS):
-            self._looked_ns = stamp_ns
-            if self._solver.branch(scene, prior.offset_m)[1] > s.switch_gain_m:
+            self._looked_ns, doubted = stamp_ns, self._doubted
+            self._doubted = self._solver.branch(scene, prior.offset_m)[1] > s.switch_gain_m
+            if doubted and self._doubted:
                 return None, duals, converged, "better branch"
         return manifold, duals, converged, ""
 
@@ -177,6 +180,7 @@ class Tracker:
             "duals": self._duals,
             "robot": np.array([robot.x, robot.y, robot.yaw, *self._point]),
             "stamps_ns": np.array([self._stamp_ns, self._looked_ns], np.int64),
+            "doubted": np.array(self._doubted),
             **self._drift.state(),
         }
 
@@ -188,6 +192,7 @@ class Tracker:
         self._point = np.array(point)
         self._robot = SE2(x, y, yaw)
         self._stamp_ns, self._looked_ns = (int(stamp) for stamp in state["stamps_ns"])
+        self._doubted = bool(state["doubted"])
         self._drift.take(state)
 
 

@@ -68,6 +68,42 @@ def test_what_breaks_the_continuation_is_named(change, category, trigger):
     assert said(planner, at(4, **change), goal).fallback_category == "none"  # and it goes on from there
 
 
+def test_a_base_that_looked_aside_for_long_backs_off_until_it_sees_what_is_right_before_it():
+    """Turned by 90 degrees for 5 s, then ahead again: what has come within the near end of its view it cannot know of."""
+    planner, pose = planner_of(lookout={"enabled": False}, prediction={"fov_deg": 87.0}), SE2()
+    for tick in range(40):
+        planner.plan(*routed(at(tick)))
+    for tick in range(40, 140):
+        planner.plan(*routed(at(tick, pose=SE2(0.0, 0.0, 0.5 * math.pi))))
+    way = []
+    for tick in range(140, 260):
+        twist = planner.plan(*routed(at(tick, pose=pose))).base
+        pose = pose.integrate(twist.vx, twist.vy, 0.0, PERIOD_S)
+        way.append(pose.x)
+    near_m, stood_m = 0.46, 0.2
+    assert min(way) == pytest.approx(stood_m - near_m, abs=0.1)  # until it sees where it stood
+    assert way[-1] > 0.3  # and then it goes
+
+
+def test_another_branch_is_taken_when_it_is_still_better_at_the_next_look_which_comes_soon(monkeypatch):
+    planner, gain, looks = planner_of(), [0.0], []
+    solver = planner._tracker._solver
+    branch = solver.branch
+
+    def look(scene, liked):
+        looks.append(gain[0])
+        return branch(scene, liked)[0], gain[0]
+
+    triggers = [said(planner, at(0)).trigger]
+    monkeypatch.setattr(solver, "branch", look)
+    for tick in range(1, 60):
+        gain[0] = 1.0 if len(looks) in (1, 4, 5) else 0.0  # for one look only, and later for two in a row
+        triggers.append(said(planner, at(tick)).trigger)
+    looked = [tick for tick in range(1, 60) if triggers[tick] == "better branch"]
+    assert looks[:7] == [0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 1.0]  # the last one lays the new manifold
+    assert len(looked) == 1
+
+
 def test_without_continuation_every_tick_is_a_failure_to_continue():
     planner = planner_of(tracker={"enabled": False})
     told = [said(planner, at(tick)) for tick in range(4)]

@@ -7,6 +7,7 @@ from scipy.optimize import lsq_linear
 from drivers.interface.commands import BodyTwist
 from drivers.interface.geometry import SE2
 from estimators.clearance import distance_to
+from estimators.field_query import sample
 from planners.clearance_manifold.chart import STEP_M, lay_chart
 from planners.clearance_manifold.control_kernels import brakable, known_length
 from planners.clearance_manifold.distance_kernels import lowered
@@ -15,6 +16,7 @@ from planners.clearance_manifold.offset_qp import OffsetProgram
 from planners.clearance_manifold.prediction import ArrivalField
 from planners.clearance_manifold.ridge_kernels import (
     NARROW,
+    STEEP,
     Demand,
     Ground,
     Sections,
@@ -121,7 +123,7 @@ def test_an_approaching_wall_is_predicted_where_the_closed_form_has_it():
     """A wall at 2 m comes with 0.3 m/s; on arrival it is nearer by h c_pred 0.3, h = x / 0.4, c_pred = 1.5 / (1.5 + h)."""
     s = PredictionSettings()
     belief = belief_of([Box(2.0, -3, 3, 3, -0.3, 0.0)], twist=BodyTwist(0.4, 0.0, 0.0))
-    predicted = ArrivalField(s).update(belief)
+    predicted = ArrivalField(s, 0.12).update(belief)
     x = np.linspace(0.0, 2.0, 20001)
     h = np.minimum(x / 0.4, s.horizon_max_s)
     reached = x[2.0 - x - 0.3 * h * s.trust_decay_s / (s.trust_decay_s + h) <= 0.0][0]
@@ -134,7 +136,7 @@ def test_an_approaching_wall_is_predicted_where_the_closed_form_has_it():
 def test_a_receding_wall_and_a_still_one_are_left_where_they_are():
     for speed in (0.0, 0.4):
         belief = belief_of([Box(1.5, -3, 3, 3, speed, 0.0)])
-        predicted = ArrivalField(PredictionSettings()).update(belief)
+        predicted = ArrivalField(PredictionSettings(), 0.12).update(belief)
         near = belief.clearance.clearance_m < 2.0
         assert predicted.clearance_m[near] == pytest.approx(belief.clearance.clearance_m[near], abs=0.08)
 
@@ -148,7 +150,7 @@ def test_what_will_be_taken_lowers_the_field_to_the_transform_of_both_to_the_bit
 
 
 def test_what_is_out_of_view_is_trusted_less_with_age():
-    field = ArrivalField(PredictionSettings(fov_deg=90.0))
+    field = ArrivalField(PredictionSettings(fov_deg=90.0), 0.12)
     behind, ahead = SE2(0.0, 0.0, np.pi), SE2()
     closing = Box(2.0, -3, 3, 3, -0.5, 0.0)
     seen = field.update(belief_of([closing], ahead)).clearance_m
@@ -160,7 +162,7 @@ def test_what_is_out_of_view_is_trusted_less_with_age():
 @pytest.mark.parametrize("velocity", [(-0.8, 0.0), (-0.5, 0.5), (0.0, -0.7)])
 def test_the_velocity_of_what_closes_in_follows_from_slopes_and_rates(velocity):
     belief = belief_of([Disc(1.6, 0.4, 0.3, *velocity)])
-    x, y, vx, vy, cells = ArrivalField(PredictionSettings()).update(belief).closing
+    x, y, vx, vy, cells = ArrivalField(PredictionSettings(), 0.12).update(belief).closing
     assert cells > 20
     assert (x, y) == pytest.approx((1.6, 0.4), abs=0.25)
     assert (vx, vy) == pytest.approx(velocity, abs=0.12)
@@ -174,6 +176,28 @@ def test_a_branch_does_not_hop_between_the_sides_of_an_obstacle():
     costs[3:6, :5] -= 0.3  # to its right later
     y, _ = cheapest_branch(costs, offsets, np.full(7, 0.3), 0.0, 1.5)
     assert (y[2:6] < -0.2).all() or (y[2:6] > 0.2).all()
+
+
+def test_a_branch_does_not_lead_through_what_stands_between_two_stations():
+    """A wall across all of the corridor, with room in the last column only: no slope of less than 80 degrees gets there."""
+    offsets, costs = np.linspace(-1.0, 1.0, 31), np.zeros((8, 31))
+    costs[3, :30] = 40.0
+    y, _ = cheapest_branch(costs, offsets, np.full(7, 0.2), 0.0, 0.01)
+    assert np.abs(np.diff(y)).max() <= STEEP * 0.2 + 1e-9
+    assert y[3] == pytest.approx(1.0)  # with a slope of 2 it is reached in three steps
+    costs[1:5, :30] = 40.0
+    near, _ = cheapest_branch(costs, offsets, np.full(7, 0.2), 0.0, 0.01)
+    assert np.abs(np.diff(near)).max() <= STEEP * 0.2 + 1e-9
+
+
+def test_the_ground_before_the_robot_is_looked_at_from_the_near_end_of_view_on_or_stood_on():
+    field = ArrivalField(PredictionSettings(fov_deg=90.0, near_m=0.46), 0.12)
+    field.update(belief_of([]))
+    belief = belief_of([], tick=5 * 10**9)
+    field.update(belief)
+    at = np.array([[0.0, 0.0], [0.3, 0.0], [0.6, 0.0], [-0.6, 0.0]])
+    assert sample(field.met_s, belief.clearance.lattice, at).tolist() == pytest.approx([0.0, 5.0, 0.0, 5.0])
+    assert sample(field.age_s, belief.clearance.lattice, at)[1] == 0.0
 
 
 def test_a_chart_ends_at_the_goal_and_bends_with_the_route():

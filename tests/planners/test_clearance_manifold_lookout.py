@@ -135,5 +135,7 @@ def test_what_seemed_to_close_in_for_a_moment_only_is_not_carried_on():
     assert memory.update(np.array([1.0, 0.5, -0.8, 0.2, 9.0]), field, age, 0.05).any()
     assert not memory.update(np.zeros(5), field, age, 0.05).any()
     for _ in range(20):
-        memory.update(np.array([1.0, 0.5, -0.3, 0.2, 9.0]), field, age, 0.05)  # as slow as the noise of a wall seen while turning
+        memory.update(
+            np.array([1.0, 0.5, -0.3, 0.2, 9.0]), field, age, 0.05
+        )  # it has a rate, but stays: a wall seen while turning
     assert not memory.update(np.zeros(5), field, age, 0.05).any()
