@@ -62,12 +62,13 @@ class Surfaces:
     loose: Mask  # (rows, columns); on open ground and no wall hangs together with it, or it has left ground
 
 
-def surfaces_of(frame: FrameLabels, remembered: Remembered, traces: Traces, stamp_ns: int) -> Surfaces:
+def surfaces_of(frame: FrameLabels, remembered: Remembered, traces: Traces, stamp_ns: int, clear_cells: int = 0) -> Surfaces:
     """Tell static and other surfaces of a frame apart by what the memory knows, and by the ground that they have left.
 
     A static surface may fall into the next cell as the robot moves, so what touches one is explained by it.  Where a wall
     comes into range, rays that end just before it make its cells free first, and so its end seems to have come there lately;
-    but it hangs together with the rest of it, and what lies behind was never seen free.
+    but it hangs together with the rest of it, and what lies behind was never seen free.  So what stands on ground that was seen
+    free for `clear_cells` all around is no wall's, though it touches one; 0: whatever touches a wall may be a part of it.
     """
     lattice, seen = frame.grid.lattice, frame.grid.label == OCCUPIED
     static = transfer((remembered.grid.label == OCCUPIED) & ~remembered.came, remembered.grid.lattice, lattice, False)
@@ -79,7 +80,12 @@ def surfaces_of(frame: FrameLabels, remembered: Remembered, traces: Traces, stam
     cells, loose_cells = (np.bincount(component[some], minlength=length) for some in (seen, unexplained))
     apart = loose_cells > STATIC_SHARE * cells
     open_ground = transfer(remembered.open, remembered.grid.lattice, lattice, False)
-    return Surfaces(lattice, unexplained, np.asarray(moving | (open_ground & apart[component])))
+    loose = moving | (open_ground & apart[component])
+    if clear_cells > 0:
+        around = np.ones((2 * clear_cells + 1, 2 * clear_cells + 1), dtype=np.uint8)
+        clear = cv2.erode(remembered.open.view(np.uint8), around) != 0
+        loose |= transfer(np.asarray(clear), remembered.grid.lattice, lattice, False)
+    return Surfaces(lattice, unexplained, np.asarray(loose))
 
 
 def _joined(cells: Mask) -> U8:

@@ -21,14 +21,15 @@ SPAN_NS = 1_000_000_000  # how long ago ground may have been left
 YOUNG_NS = 1_500_000_000  # what stands in its cells for longer does not move
 YOUNG_SHARE = 0.8  # of a surface's cells
 LEFT_MIN = 5  # cells; fewer are noise
-WIDEST_M = 0.75  # across a surface; a wider one is a wall's, or holds a piece of one
+WIDEST_M = 0.75  # across a surface, unless told otherwise; a wider one is a wall's, or holds a piece of one
 
 
 class Traces:
     """When each cell around the robot was last seen occupied, and since when it is."""
 
-    def __init__(self) -> None:
-        """Start with nothing seen."""
+    def __init__(self, widest_m: float = WIDEST_M) -> None:
+        """Start with nothing seen; surfaces wider than this leave no ground."""
+        self._widest_m = widest_m
         self._lattice = Lattice(0.0, 0.0, 1.0, 0, 0)
         self._seen_ns: NDArray[np.int64] = np.zeros((0, 0), dtype=np.int64)
         self._since_ns: NDArray[np.int64] = np.zeros((0, 0), dtype=np.int64)
@@ -55,7 +56,7 @@ class Traces:
         seen = label == OCCUPIED
         young = seen & (self._since_ns >= stamp_ns - YOUNG_NS)
         cells, young_cells = (np.bincount(component[some], minlength=len(left)) for some in (seen, young))
-        return np.asarray((left >= LEFT_MIN) & (young_cells > YOUNG_SHARE * cells) & (across_m <= WIDEST_M))
+        return np.asarray((left >= LEFT_MIN) & (young_cells > YOUNG_SHARE * cells) & (across_m <= self._widest_m))
 
     def snapshot(self) -> bytes:
         """Return the whole state."""

@@ -56,7 +56,7 @@ class GridTracker:
         self._tracks: list[Followed] = []  # by identity
         self._next_identity = 0
         self._stamp_ns = 0
-        self._traces = Traces()
+        self._traces = Traces(settings.left_width_max_m)
 
     def warm_up(self) -> None:
         """Compile every kernel."""
@@ -68,7 +68,7 @@ class GridTracker:
         carry = ConstantVelocity((stamp_ns - self._stamp_ns) / SECOND_NS, settings.acceleration_m_s2)
         self._stamp_ns = stamp_ns
         tracks = [replace(one, motion=carry.carry(one.motion)) for one in self._tracks if self._recent(one, stamp_ns)]
-        surfaces = surfaces_of(frame, remembered, self._traces, stamp_ns)
+        surfaces = surfaces_of(frame, remembered, self._traces, stamp_ns, settings.clear_cells)
         found = segments(surfaces, [track.disc for track in tracks], settings.cells_min, settings.radius_max_m)
         pairs = self._assign(tracks, found, lattice)
         tracks = [self._seen(track, found[pairs[i]], lattice) if i in pairs else track for i, track in enumerate(tracks)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from drivers.interface.settings import Settings
+from estimators.tracks.traces import WIDEST_M
 
 
 class TrackingSettings(Settings):
@@ -12,6 +13,15 @@ class TrackingSettings(Settings):
 
     cells_min: int = Field(default=3, ge=1, le=100, description="smaller components are noise")
     radius_max_m: float = Field(default=0.6, gt=0.0, le=3.0, description="what looks wider is no obstacle that moves")
+    left_width_max_m: float = Field(
+        default=WIDEST_M,
+        gt=0.0,
+        le=6.0,
+        description="widest surface, corner to corner, that is taken to move because it left ground",
+    )
+    clear_cells: int = Field(
+        default=0, ge=0, le=20, description="what touches a wall on ground seen free so far around is tracked; 0: it is none"
+    )
     radius_min_m: float = Field(default=0.05, gt=0.0, le=1.0, description="no track is thinner")
     sigma_m: float = Field(default=0.04, gt=0.0, le=1.0, description="of a measured centre, each axis")
     speed_sigma_m_s: float = Field(default=0.8, gt=0.0, le=5.0, description="of a new track's velocity, each axis")

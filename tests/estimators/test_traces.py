@@ -68,8 +68,10 @@ def test_a_wall_that_comes_into_range_leaves_none() -> None:
     assert not any(watch(grids))
 
 
-def test_what_is_wider_than_a_person_is_no_mover() -> None:
-    assert not any(watch([frame(1.9, 0.4 * t, radius_m=0.6) for t in np.arange(12) * FRAME_NS / 1e9]))
+def test_what_is_wider_than_a_person_is_no_mover_unless_it_may_be() -> None:
+    grids = [frame(1.9, 0.4 * t, radius_m=0.6) for t in np.arange(12) * FRAME_NS / 1e9]
+    assert not any(watch(grids))
+    assert any(watch(grids, Traces(widest_m=1.5)))
 
 
 def test_who_has_stopped_is_soon_no_mover_any_more() -> None:

@@ -254,6 +254,12 @@ def test_what_touches_the_static_world_is_explained_by_it_and_what_hangs_togethe
     assert [(len(one.points), one.loose) for one in segments(surfaces, [], 3, 0.6)] == [(5, False), (4, True)]
     shut_in = surfaces_of(frame_labels, Remembered(OccupancyGrid(LATTICE, known), moving, ~ground), Traces(), 0)
     assert [one.loose for one in segments(shut_in, [], 3, 0.6)] == [False, False]
+    behind = ground.copy()
+    behind[41:] = False  # nobody has seen what lies behind the wall's end
+    for known_free, is_loose in ((ground, True), (behind, False)):
+        remembered = Remembered(OccupancyGrid(LATTICE, known), moving, known_free)
+        end_first = segments(surfaces_of(frame_labels, remembered, Traces(), 0, clear_cells=2), [], 3, 0.6)[0]
+        assert (len(end_first.points), end_first.loose) == (5, is_loose)
 
 
 def test_constant_velocity_in_closed_form():
