@@ -46,6 +46,11 @@ def corrected(motion: Motion, position_m: F64, covariance_m2: F64) -> Motion:
     return Motion(state, 0.5 * (covariance + covariance.T))
 
 
+def shifted(motion: Motion, offset_m: F64) -> Motion:
+    """Return the motion of a point that goes along at an offset, shape (2,)."""
+    return Motion(motion.state + np.concatenate((offset_m, np.zeros(2))), motion.covariance)
+
+
 def squared_distance(motion: Motion, position_m: F64, covariance_m2: F64) -> float:
     """Return the squared Mahalanobis distance of a measured position, shape (2,), with a covariance, shape (2, 2)."""
     offset = position_m - motion.state[:2]

@@ -15,8 +15,8 @@ from estimators.belief import F64, OCCUPIED, U8, Lattice, Mask, OccupancyGrid
 from estimators.grid.labelling import FrameLabels
 from estimators.memory.remembered import Remembered
 from estimators.memory.rolling import transfer
+from estimators.tracks.outline import Outline, apparent_radius_m, bearing_of, centre_of, outline_of
 from estimators.tracks.traces import Traces
-from estimators.tracks.tracking_kernels import apparent_disc, centre_of
 
 STATIC_SHARE = 0.5  # of a connected surface; from here on the rest is taken for a part of the same wall
 NEIGHBOURS = np.ones((3, 3), dtype=np.uint8)
@@ -36,16 +36,16 @@ class Segment:
     """The seen surface of something that moves."""
 
     points: F64  # (n, 2), centres of its cells in odom
+    outline: Outline
     disc: Disc  # what it looks like, by its width
     loose: bool  # whether most of it is sure to be no wall
 
 
 def warm_up() -> None:
     """Compile every kernel."""
-    apparent_disc(np.ones((1, 2)), 0.0, 0.0)
-    centre_of(np.ones((1, 2)), 0.0, 0.0, 1.0)
     nothing = OccupancyGrid(Lattice(0.0, 0.0, 1.0, 8, 8), frozen_array(np.zeros((8, 8), dtype=np.uint8)))
     Traces().moving(nothing, np.zeros((8, 8), dtype=np.int32), np.zeros(1), 0)
+    centre_of(np.ones((1, 2)), 0.0, 0.0, outline_of(np.ones((1, 2)), 0.0, 0.0, nothing.label, 0.0, 0.0, 1.0), 1.0)
 
 
 def sensor_of(lattice: Lattice) -> tuple[float, float]:
@@ -58,6 +58,7 @@ class Surfaces:
     """Which cells of a frame are occupied by what is not static."""
 
     lattice: Lattice
+    label: U8  # (rows, columns), the frame's
     unexplained: Mask  # (rows, columns)
     loose: Mask  # (rows, columns); on open ground and no wall hangs together with it, or it has left ground
 
@@ -85,7 +86,7 @@ def surfaces_of(frame: FrameLabels, remembered: Remembered, traces: Traces, stam
         around = np.ones((2 * clear_cells + 1, 2 * clear_cells + 1), dtype=np.uint8)
         clear = cv2.erode(remembered.open.view(np.uint8), around) != 0
         loose |= transfer(np.asarray(clear), remembered.grid.lattice, lattice, False)
-    return Surfaces(lattice, unexplained, np.asarray(loose))
+    return Surfaces(lattice, frame.grid.label, unexplained, np.asarray(loose))
 
 
 def _joined(cells: Mask) -> U8:
@@ -106,11 +107,12 @@ def segments(surfaces: Surfaces, expected: list[Disc], cells_min: int, radius_ma
     for one in np.unique(part):
         surface = np.ascontiguousarray(points[part == one])
         if len(surface) >= cells_min:
-            bearing, nearest, radius = apparent_disc(surface, x, y)
+            outline = outline_of(surface, x, y, surfaces.label, lattice.x_m, lattice.y_m, lattice.cell_m)
+            radius = apparent_radius_m(outline)
             if radius <= radius_max_m:
-                far = nearest + radius
+                bearing, far = bearing_of(outline, radius), outline.nearest_m + radius
                 disc = Disc(x + far * math.cos(bearing), y + far * math.sin(bearing), radius)
-                found.append(Segment(surface, disc, bool(loose[part == one].mean() > 0.5)))
+                found.append(Segment(surface, outline, disc, bool(loose[part == one].mean() > 0.5)))
     return found
 
 
@@ -136,8 +138,4 @@ def _cut(points: F64, part: NDArray[Any], expected: list[Disc]) -> NDArray[Any]:
 
 def centred(segment: Segment, radius_m: float, lattice: Lattice) -> F64:
     """Return the centre in odom, shape (2,), of the disc of known radius that shows this surface to the sensor."""
-    x, y = sensor_of(lattice)
-    far = math.hypot(segment.disc.x_m - x, segment.disc.y_m - y)
-    share = 1.0 + (radius_m - segment.disc.radius_m) / far
-    guess = x + share * (segment.disc.x_m - x), y + share * (segment.disc.y_m - y)
-    return np.array(centre_of(segment.points, *guess, radius_m))
+    return np.array(centre_of(segment.points, *sensor_of(lattice), segment.outline, radius_m))

@@ -22,7 +22,7 @@ from estimators.belief import F64, FREE, Lattice, OccupancyGrid, Track
 from estimators.grid.labelling import FrameLabels
 from estimators.memory.remembered import Remembered
 from estimators.tracks import segmentation
-from estimators.tracks.constant_velocity import PLANE, ConstantVelocity, Motion, corrected, squared_distances
+from estimators.tracks.constant_velocity import PLANE, ConstantVelocity, Motion, corrected, shifted, squared_distances
 from estimators.tracks.segmentation import Disc, Segment, centred, segments, surfaces_of
 from estimators.tracks.traces import Traces
 from estimators.tracks.tracking_settings import TrackingSettings
@@ -101,15 +101,17 @@ class GridTracker:
         return distances
 
     def _sigma_m(self, track: Followed, segment: Segment) -> float:
-        """Return how far off a centre may be: what looks narrower than it is, is hidden in part, and who knows which."""
-        return self._settings.sigma_m + max(0.0, 0.8 * track.radius_m - segment.disc.radius_m)
+        """Return how far off a centre may be: what shows neither of its sides may reach to either beyond what is seen."""
+        return self._settings.sigma_m + _slack_m(segment, track.radius_m)
 
     def _seen(self, track: Followed, segment: Segment, lattice: Lattice) -> Followed:
         settings, wider_m = self._settings, segment.disc.radius_m - track.radius_m
-        gain = settings.radius_gain if wider_m > 0.0 else 0.1 * settings.radius_gain
+        narrower = 0.1 * settings.radius_gain if segment.outline.whole else 0.0
+        gain = settings.radius_gain if wider_m > 0.0 else narrower
         radius_m = max(track.radius_m + gain * wider_m, settings.radius_min_m)
-        covariance = self._sigma_m(track, segment) ** 2 * PLANE
-        motion = corrected(track.motion, centred(segment, radius_m, lattice), covariance)
+        covariance, centre = self._sigma_m(track, segment) ** 2 * PLANE, centred(segment, track.radius_m, lattice)
+        moved = corrected(track.motion, centre, covariance)
+        motion = shifted(moved, centred(segment, radius_m, lattice) - centre)  # a disc that grows has not moved
         seen_ns = self._stamp_ns if segment.loose else track.seen_ns  # or a track that met a wall's end would follow it
         return Followed(track.identity, motion, radius_m, track.hits + 1, seen_ns)
 
@@ -120,12 +122,15 @@ class GridTracker:
         return not gone or self._stamp_ns - track.seen_ns <= self._settings.vanish_s * SECOND_NS
 
     def _give_birth(self, segment: Segment, lattice: Lattice) -> None:
-        """Begin a track, unless the segment is a piece of one that is there."""
-        radius_m = max(segment.disc.radius_m, self._settings.radius_min_m)
+        """Begin a track, unless the segment is a piece of one that is there; what is hidden in part is as wide as is usual."""
+        settings = self._settings
+        least_m = settings.radius_min_m if segment.outline.whole else settings.radius_usual_m
+        radius_m = max(segment.disc.radius_m, least_m)
         x, y = centred(segment, radius_m, lattice)
         if any((x - one.disc.x_m) ** 2 + (y - one.disc.y_m) ** 2 < one.radius_m**2 for one in self._tracks):
             return
-        variance = np.repeat((self._settings.sigma_m**2, self._settings.speed_sigma_m_s**2), 2)
+        sigma_m = settings.sigma_m + _slack_m(segment, radius_m)
+        variance = np.repeat((sigma_m**2, settings.speed_sigma_m_s**2), 2)
         motion = Motion(np.array([x, y, 0.0, 0.0]), np.diag(variance))
         self._tracks.append(Followed(self._next_identity, motion, radius_m, 1, self._stamp_ns))
         self._next_identity += 1
@@ -169,6 +174,12 @@ class GridTracker:
         ]
         self._traces.restore(state["traces"].tobytes())
         self._next_identity, self._stamp_ns = int(state["next_identity"]), int(state["stamp_ns"])
+
+
+def _slack_m(segment: Segment, radius_m: float) -> float:
+    """Return how far a disc that shows neither of its sides may reach to either beyond what is seen of it."""
+    own = segment.outline.right_own or segment.outline.left_own
+    return 0.0 if own else max(0.0, radius_m - segment.disc.radius_m)
 
 
 def _track(one: Followed, now: Motion) -> Track:
