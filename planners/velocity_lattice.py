@@ -65,6 +65,11 @@ class VelocityLattice:
         rest = int(np.argmin(np.abs(self.speed_m_s))), int(np.argmin(np.abs(self.turn_rad_s)))
         return rest[0] * len(self.turn_rad_s) + rest[1]
 
+    def nearest(self, twist: BodyTwist) -> int:
+        """Return the command nearest to how a base drives, axis by axis."""
+        speed, turn = np.argmin(np.abs(self.speed_m_s - twist.vx)), np.argmin(np.abs(self.turn_rad_s - twist.wz))
+        return int(speed) * len(self.turn_rad_s) + int(turn)
+
     def change_from(self, index: int) -> F64:
         """Return how far each command is from one of them, shape (commands,), in full speeds and turns."""
         speed, turn = divmod(index, len(self.turn_rad_s))

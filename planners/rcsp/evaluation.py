@@ -21,7 +21,7 @@ from planners.rcsp.kernels import (
     clearances,
     largest,
     lower_at_rest,
-    mean_risk,
+    mean_risks,
     reacting_clearances,
     tails,
 )
@@ -41,6 +41,7 @@ class Evaluation:
     objective: F64  # (commands,), J
     reward: F64  # (commands,), R
     risk: F64  # (commands,), the risk measure of G
+    mean_risk: F64  # (commands,), the mean of G over all scenarios
     room_m: F64  # (commands,), mean clearance of the tail, up to where there is no risk
     free: NDArray[np.bool_]  # (commands,), whether fewer scenarios than make a tail touch anything
     clearance: F32  # (commands, scenarios), tail first
@@ -51,12 +52,13 @@ class Evaluation:
     def best(self, effort: F64) -> tuple[int, bool]:
         """Return the command to ask for, and whether it is free: the best by objective, else, where none is, the least risky.
 
-        Of commands that are as risky, the calmest is taken, by `effort`, shape (commands,): progress does not decide between
-        collisions.
+        Where the tail of every command touches somebody, tails do not differ by how likely that is, so it is the mean risk that
+        decides.  Of commands that are as risky, the calmest is taken, by `effort`, shape (commands,): progress does not decide
+        between collisions.
         """
         if self.free.any():
             return int(np.argmax(np.where(self.free, self.objective, -np.inf))), True
-        risk = np.rint(1e6 * self.risk)
+        risk = np.rint(1e6 * self.mean_risk)
         return int(np.argmin(np.where(risk == risk.min(), effort, np.inf))), False
 
 
@@ -84,7 +86,7 @@ class Evaluator:
         Args:
             rolled: where each command leads.
             reward: shape (commands,).
-            nominal: the command that stands for the motion of the robot that obstacles react to.
+            nominal: the command of the motion of the robot that obstacles react to.
             scenarios: N.
             chance: what futures are drawn from.
             room_m: least clearance to what stands still on the way ahead.
@@ -94,7 +96,10 @@ class Evaluator:
         futures, clearance = self._held_against(rolled, path_of(rolled, nominal), scenarios, chance, walls)
         tail = tail_of(s.risk, scenarios)
         risk, tail_room_m, free = tails(clearance, rolled.static_m, rolled.brakable, tail, self._risk, static_safe_m)
-        return Evaluation(reward - s.risk.weight * risk, reward, risk, tail_room_m, free, clearance, futures, tail, static_safe_m)
+        mean = mean_risks(clearance, rolled.static_m, rolled.brakable, self._risk, static_safe_m)
+        return Evaluation(
+            reward - s.risk.weight * risk, reward, risk, mean, tail_room_m, free, clearance, futures, tail, static_safe_m
+        )
 
     def static_safe_m(self, room_m: float) -> float:
         """Return the clearance beyond which what stands still is no risk, on a way that has so little room.
@@ -122,11 +127,6 @@ class Evaluator:
             clearance = clearances(rolled.x, rolled.y, futures.position_in_odom[: s.steps], contact, far_m)
         lower_at_rest(rolled.rest, futures.position_in_odom[s.steps :], contact, far_m, tail_of(s.risk, scenarios), clearance)
         return replace(futures, position_in_odom=futures.position_in_odom[: s.steps]), clearance
-
-    def mean_risk(self, told: Evaluation, rolled: Rollouts, command: int) -> float:
-        """Return the mean over the scenarios of a command's risk."""
-        static_m, brakable = float(rolled.static_m[command]), bool(rolled.brakable[command])
-        return float(mean_risk(told.clearance[command], static_m, brakable, self._risk, told.static_safe_m))
 
     def bound(self, scenarios: int) -> float:
         """Return epsilon_N(delta) of proposition C.3."""

@@ -236,7 +236,7 @@ def reacting_clearances(x: F32, y: F32, draws: Draws, steps_s: F64, far_m: float
 def tails(
     clearance: F32, static_m: F32, brakable: NDArray[np.bool_], count: int, risk: Risk, static_safe_m: float
 ) -> tuple[F64, F64, NDArray[np.bool_]]:
-    """Return of every command: the mean risk of its tail, the tail's mean clearance, and whether the tail is free.
+    """Return of every command: the mean risk of its tail, the tail's mean clearance, and whether it is free.
 
     The tail is the `count` scenarios of least clearance.  A command from which the robot cannot brake in time for what stands
     still collides in every scenario.
@@ -250,7 +250,7 @@ def tails(
         static_safe_m: clearance beyond which what stands still is no risk.
 
     Returns:
-        Shapes (commands,); a tail is free where fewer than `count` scenarios meet an obstacle.
+        Shapes (commands,); free is what meets an obstacle, under way or where it then stands, in fewer than `count` scenarios.
     """
     commands, n = clearance.shape
     tail, room, free = np.empty(commands), np.empty(commands), np.empty(commands, np.bool_)
@@ -267,18 +267,22 @@ def tails(
             total += max(floor, risk_of(row[i], risk.safe_m, risk))
             width += row[i]
             edge = max(edge, row[i])
-        tail[u], room[u], free[u] = total / count, min(width / count, static_m[u]), edge >= 0.0 and brakable[u]
+        tail[u], room[u], free[u] = total / count, min(width / count, static_m[u]), edge > 0.0 and brakable[u]
     return tail, room, free
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def mean_risk(clearance: F32, static_m: float, brakable: bool, risk: Risk, static_safe_m: float) -> float:
-    """Return the mean risk of one command over the scenarios, shape (scenarios,)."""
-    floor = risk_of(static_m if brakable else -np.inf, static_safe_m, risk)
-    total = 0.0
-    for i in range(len(clearance)):
-        total += max(floor, risk_of(clearance[i], risk.safe_m, risk))
-    return total / len(clearance) if len(clearance) else floor
+def mean_risks(clearance: F32, static_m: F32, brakable: NDArray[np.bool_], risk: Risk, static_safe_m: float) -> F64:
+    """Return the mean risk of every command over the scenarios, shape (commands,); the arguments are those of `tails`."""
+    commands, n = clearance.shape
+    mean = np.empty(commands)
+    for u in range(commands):
+        floor = risk_of(static_m[u] if brakable[u] else -np.inf, static_safe_m, risk)
+        total = 0.0
+        for i in range(n):
+            total += max(floor, risk_of(clearance[u, i], risk.safe_m, risk))
+        mean[u] = total / n if n else floor
+    return mean
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -100,7 +100,8 @@ class Rcsp:
         reward = self._reward(belief, path, along, rolled)
         chance = Chance(self._setup.seed, "rcsp", belief.tick) if self._settings.fresh_draws else self._chance
         walls = Walls(around.clearance, around.corner_x, around.corner_y, around.cell_m)
-        told = self._evaluator.evaluate(rolled, reward, self._last, scenarios, chance, room_m, walls)
+        nominal = self._lattice.nearest(belief.twist)
+        told = self._evaluator.evaluate(rolled, reward, nominal, scenarios, chance, room_m, walls)
         self._last, free = told.best(self._effort)
         return self._plan(belief, rolled, told, free, budget_ns)
 
@@ -171,7 +172,7 @@ class Rcsp:
             objective=float(told.objective[chosen]),
             progress=float(told.reward[chosen]),
             cvar=float(told.risk[chosen]),
-            mean_risk=self._evaluator.mean_risk(told, rolled, chosen),
+            mean_risk=float(told.mean_risk[chosen]),
             tail_room_m=float(told.room_m[chosen]),
             free=int(told.free.sum()),
             obstacles=position.shape[1],

@@ -67,7 +67,7 @@ class RcspSettings(Settings):
 
     predictor: Literal["conjectures", "constant_velocity", "random_walk"] = "conjectures"
     reaction: Literal["nominal", "candidate"] = Field(
-        default="nominal", description="which motion of the robot the obstacles react to"
+        default="nominal", description="which motion of the robot the obstacles react to; nominal: that it goes on as it drives"
     )
     steps: int = Field(default=25, ge=2, le=200, description="H")
     step_s: float = Field(default=0.1, gt=0.0, le=1.0)
@@ -77,7 +77,7 @@ class RcspSettings(Settings):
         le=50,
         description="after the horizon the robot brakes and stands; so long it is held against the futures",
     )
-    rest_step_s: float = Field(default=0.4, gt=0.0, le=2.0, description="each of these steps")
+    rest_step_s: float = Field(default=0.6, gt=0.0, le=2.0, description="each of these steps")
     hold_m: float = Field(default=0.05, ge=0.0, le=1.0, description="a rollout brakes where what stands still is nearer")
     track_margin_m: float = Field(
         default=0.10, ge=0.0, le=1.0, description="occupied cells this near to a track's disc are its own"

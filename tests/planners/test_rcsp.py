@@ -13,8 +13,21 @@ from drivers.interface.geometry import SE2
 from drivers.interface.samples import frozen_array
 from estimators.belief import Track
 from planners.planner import Anytime, PlannerSetup
+from planners.prediction.predictor import Futures
 from planners.rcsp.budget import affordable
-from planners.rcsp.kernels import INVERSE_CLEARANCE, NEAR_MISS, VIOLATION, Risk, clearances, largest, lower_at_rest, risk_of
+from planners.rcsp.evaluation import Evaluation
+from planners.rcsp.kernels import (
+    INVERSE_CLEARANCE,
+    NEAR_MISS,
+    VIOLATION,
+    Risk,
+    clearances,
+    largest,
+    lower_at_rest,
+    mean_risks,
+    risk_of,
+    tails,
+)
 from planners.rcsp.planner import Rcsp
 from planners.rcsp.progress_kernels import to_go
 from planners.router import RouterSetup
@@ -245,6 +258,21 @@ def test_a_restored_one_continues_identically_among_tracks(settings):
         assert facts(first.plan(belief, straight(belief))) == facts(second.plan(belief, straight(belief)))
 
 
+def test_who_reacts_does_so_to_how_the_robot_drives_and_not_to_what_it_asked_for():
+    """Else they would chase the last choice, the other one would look free of them, and the next choice would be that one."""
+    driving, ahead, futures = BodyTwist(0.5, 0.0, 0.0), [Box(1.0, -1.5, 1.2, 1.5)], []
+    for walls in ([], ahead):
+        planner = planner_of(prediction={"family": ["aggressive"]})
+        asked = planned(planner=planner, walls=(*WALLS, *walls), twist=driving)
+        told = planned(track(1.6, 1.2, 0.0, -0.6), planner=planner, twist=driving, tick=2)
+        futures.append((asked.base.vx, {one.name: one.points_in_odom for one in told.drawings if one.name.startswith("future")}))
+    (free_m_s, one), (blocked_m_s, other) = futures
+    assert free_m_s > blocked_m_s + 0.1
+    assert one.keys() == other.keys() != set()
+    for name, points in one.items():
+        np.testing.assert_allclose(points, other[name], atol=0.01)  # the last command is still under way for a moment
+
+
 def test_the_layers_show_candidates_futures_and_where_it_would_commit():
     drawings = {d.name: d.points_in_odom for d in planned(track(1.6, 0.0, -0.5), twist=BodyTwist(0.6, 0.0, 0.0)).drawings}
     groups = [len(points) for name, points in drawings.items() if name.startswith("candidates_")]
@@ -285,6 +313,31 @@ def test_standing_in_somebody_s_way_after_the_horizon_is_a_near_miss():
     apart = np.full((1, 1), np.float32(0.4))
     lower_at_rest(np.array([[0.0, 0.7]], np.float32), futures, np.array([0.5], np.float32), 0.4, 1, apart)
     assert apart[0, 0] == pytest.approx(math.hypot(0.2, 0.7) - 0.5)
+
+
+def evaluation_of(*commands):
+    """What came of a hundred scenarios; each command is clearances and how many scenarios have them."""
+    clearance = np.array([[c for c, times in command for _ in range(times)] for command in commands], np.float32)
+    count, n = clearance.shape
+    room_m, brakable, risk = np.ones(count, np.float32), np.ones(count, np.bool_), Risk(NEAR_MISS, 0.4, 3.0, 0.3)
+    told = tails(clearance, room_m, brakable, 10, risk, 0.15)
+    mean = mean_risks(clearance, room_m, brakable, risk, 0.15)
+    nobody = Futures(np.zeros((1, 0, 2, n), np.float32), np.zeros(0), np.zeros((0, n), np.int64))
+    return Evaluation(-told[0], np.zeros(count), told[0], mean, told[1], told[2], clearance, nobody, 10, 0.15)
+
+
+def test_where_every_tail_touches_somebody_the_less_likely_collision_is_taken():
+    likely, deeper = [(-0.1, 90), (0.5, 10)], [(-0.2, 20), (0.5, 80)]
+    told = evaluation_of(likely, deeper)
+    assert told.risk[0] < told.risk[1]
+    np.testing.assert_allclose(told.mean_risk, [0.9 * (4.0 + 1 / 3), 0.2 * (4.0 + 2 / 3)], rtol=1e-6)
+    assert told.best(np.zeros(2)) == (1, False)
+
+
+def test_a_command_that_leads_to_where_somebody_comes_is_not_free():
+    trap, near = [(0.0, 10), (0.5, 90)], [(0.01, 90), (0.5, 10)]
+    told = evaluation_of(trap, near, [(0.0, 9), (0.5, 91)])
+    assert told.free.tolist() == [False, True, True]
 
 
 def test_it_does_not_flee_along_the_way_of_who_comes_after_it():
