@@ -27,10 +27,10 @@ class TrackingSettings(Settings):
         default=0.25, gt=0.0, le=1.0, description="of a new track that is hidden in part, or more where it looks wider"
     )
     sigma_m: float = Field(default=0.03, gt=0.0, le=1.0, description="of a measured centre, each axis")
-    speed_sigma_m_s: float = Field(default=1.2, gt=0.0, le=5.0, description="of a new track's velocity, each axis")
+    speed_sigma_m_s: float = Field(default=0.8, gt=0.0, le=5.0, description="of a new track's velocity, each axis")
     acceleration_m_s2: float = Field(default=2.0, gt=0.0, le=20.0, description="standard deviation of what changes a velocity")
     gate: float = Field(default=13.8, gt=0.0, le=100.0, description="largest squared distance; 13.8: 99.9 % of two axes")
-    hits_min: int = Field(default=2, ge=1, le=100, description="frames in which a track was seen before it is given out")
+    hits_min: int = Field(default=3, ge=1, le=100, description="frames in which a track was seen before it is given out")
     vanish_s: float = Field(default=0.25, ge=0.0, le=10.0, description="how long it lives where its place is seen free")
     coast_s: float = Field(default=1.5, ge=0.0, le=30.0, description="how long it lives out of sight")
     radius_gain: float = Field(

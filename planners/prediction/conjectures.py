@@ -38,6 +38,8 @@ class ConjectureFamily:
                 for m in models
             ]
         )  # fmt: skip
+        self._believed = self._coefficients.copy()  # with the noise that beliefs are carried on with
+        self._believed[:, 4] = np.maximum(self._believed[:, 4], settings.drift_m_s2)
         self._cap = np.array([settings.sigma_cap_m, settings.speed_sigma_cap_m_s])
         self.reset()
 
@@ -81,7 +83,7 @@ class ConjectureFamily:
         before = self._seen.identity if elapsed_s > 0.0 else self._seen.identity[:0]
         places = places_of(now.identity, before)
         self._mean, self._spread, likelihood = followed(
-            self._mean, self._spread, places, self._coefficients, now.state, now.spread, now.radius_m + self._robot_radius_m,
+            self._mean, self._spread, places, self._believed, now.state, now.spread, now.radius_m + self._robot_radius_m,
             robot, self._settings.reaction_range_m, elapsed_s,
         )  # fmt: skip
         self._seen = now

@@ -56,6 +56,12 @@ class PredictionSettings(Settings):
     temperature: float = Field(default=2.0, gt=0.0, le=1000.0, description="tau: the likelihood is taken to the power 1 / tau")
     floor: float = Field(default=0.02, ge=0.0, lt=1.0, description="least weight of a conjecture")
     top_k: int = Field(default=4, ge=1, le=6, description="futures are drawn from so many of the heaviest conjectures")
+    drift_m_s2: float = Field(
+        default=1.0,
+        ge=0.0,
+        le=20.0,
+        description="standard deviation of what changes a believed velocity, each axis: a track takes back its first guesses",
+    )
     reaction_range_m: float = Field(default=2.0, gt=0.0, le=20.0, description="how far from contact an obstacle begins to react")
     sigma_cap_m: float = Field(
         default=1.0, gt=0.0, le=10.0, description="a position less certain than this is drawn as if it were so"

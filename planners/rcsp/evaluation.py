@@ -125,7 +125,7 @@ class Evaluator:
             keep_out(futures.position_in_odom, futures.radius_m, walls)
             contact = (futures.radius_m + self._radius_m).astype(np.float32)
             clearance = clearances(rolled.x, rolled.y, futures.position_in_odom[: s.steps], contact, far_m)
-        lower_at_rest(rolled.rest, futures.position_in_odom[s.steps :], contact, far_m, tail_of(s.risk, scenarios), clearance)
+        lower_at_rest(rolled.rest, futures.position_in_odom[s.steps :], contact, far_m, clearance)
         return replace(futures, position_in_odom=futures.position_in_odom[: s.steps]), clearance
 
     def bound(self, scenarios: int) -> float:

@@ -18,7 +18,6 @@ F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
 FAST = {"contract", "reassoc", "arcp", "nsz"}
 
-_TOUCH = np.nextafter(np.float32(0.0), np.float32(-1.0))  # the largest clearance of who overlaps
 INVERSE_CLEARANCE, VIOLATION, NEAR_MISS = 0, 1, 2
 
 
@@ -170,39 +169,31 @@ def clearances(x: F32, y: F32, futures: F32, contact: F32, far_m: float) -> F32:
 
 
 @njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[untyped-decorator]
-def lower_at_rest(rest: F32, futures: F32, contact: F32, far_m: float, tail: int, clearance: F32) -> None:
+def lower_at_rest(rest: F32, futures: F32, contact: F32, far_m: float, clearance: F32) -> None:
     """Lower clearances, shape (commands, scenarios), to what a robot that stands after the horizon has, but not below zero.
 
     A command that leads to where somebody comes has led into a trap; it is a near miss and no collision yet, as there is time
-    to leave.  Nothing is done for a command whose tail touches somebody before: it is infeasible already.
+    to leave.
 
     Args:
         rest: where each command comes to rest, shape (commands, 2).
         futures: after the horizon, shape (steps, obstacles, 2, scenarios).
         contact: distance of the centres at contact, shape (obstacles,).
         far_m: clearance that matters.
-        tail: scenarios in it.
         clearance: over the horizon, lowered, shape (commands, scenarios).
     """
     steps, obstacles, _, n = futures.shape
     if steps == 0 or n == 0:
         return
     zero, best, own, all_steps = np.float32(0.0), np.empty(n, np.float32), np.empty((steps, 2, n), np.float32), np.arange(steps)
-    x, y, here, lost = (
-        np.empty(steps, np.float32),
-        np.empty(steps, np.float32),
-        np.empty(2, np.float32),
-        np.empty(len(rest), np.bool_),
-    )
-    for u in range(len(rest)):
-        lost[u] = count_within(clearance[u], _TOUCH) >= tail
+    x, y, here = np.empty(steps, np.float32), np.empty(steps, np.float32), np.empty(2, np.float32)
     for m in range(obstacles):
         own[:] = futures[:, m]
         box, reach = boxes(own), contact[m] + np.float32(far_m)
         left, right, bottom, top = box[0].min() - reach, box[1].max() + reach, box[2].min() - reach, box[3].max() + reach
         for u in range(len(rest)):
             here[:] = rest[u]
-            if lost[u] or here[0] < left or here[0] > right or here[1] < bottom or here[1] > top:
+            if here[0] < left or here[0] > right or here[1] < bottom or here[1] > top:
                 continue
             best[:], x[:], y[:] = reach * reach, here[0], here[1]
             nearest_squared(x, y, own, all_steps, best)
@@ -273,14 +264,19 @@ def tails(
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def mean_risks(clearance: F32, static_m: F32, brakable: NDArray[np.bool_], risk: Risk, static_safe_m: float) -> F64:
-    """Return the mean risk of every command over the scenarios, shape (commands,); the arguments are those of `tails`."""
+    """Return the mean risk of every command over the scenarios, shape (commands,); the arguments are those of `tails`.
+
+    Who is touched where it stands after the horizon, at a clearance of zero, has time to leave, but maybe no way: it is taken
+    for half a collision.
+    """
     commands, n = clearance.shape
-    mean = np.empty(commands)
+    mean, trapped = np.empty(commands), 0.5 * (risk_of(0.0, risk.safe_m, risk) + risk_of(-1e-6, risk.safe_m, risk))
     for u in range(commands):
         floor = risk_of(static_m[u] if brakable[u] else -np.inf, static_safe_m, risk)
         total = 0.0
         for i in range(n):
-            total += max(floor, risk_of(clearance[u, i], risk.safe_m, risk))
+            c = clearance[u, i]
+            total += max(floor, trapped if c == 0.0 else risk_of(c, risk.safe_m, risk))
         mean[u] = total / n if n else floor
     return mean
 

@@ -308,10 +308,10 @@ def test_standing_in_somebody_s_way_after_the_horizon_is_a_near_miss():
     futures = np.array([[-1.0, -0.2, 0.6], [0.0, 0.0, 0.0]], np.float32).T.reshape(3, 1, 2, 1)  # (steps, 1, 2, 1): past the first
     clearance = np.full((3, 1), np.float32(0.4))
     clearance[2] = -0.1  # it touches somebody before
-    lower_at_rest(rest, futures, np.array([0.5], np.float32), 0.4, 1, clearance)
+    lower_at_rest(rest, futures, np.array([0.5], np.float32), 0.4, clearance)
     assert clearance[:, 0] == pytest.approx([0.0, 0.4, -0.1])
     apart = np.full((1, 1), np.float32(0.4))
-    lower_at_rest(np.array([[0.0, 0.7]], np.float32), futures, np.array([0.5], np.float32), 0.4, 1, apart)
+    lower_at_rest(np.array([[0.0, 0.7]], np.float32), futures, np.array([0.5], np.float32), 0.4, apart)
     assert apart[0, 0] == pytest.approx(math.hypot(0.2, 0.7) - 0.5)
 
 
@@ -331,6 +331,13 @@ def test_where_every_tail_touches_somebody_the_less_likely_collision_is_taken():
     told = evaluation_of(likely, deeper)
     assert told.risk[0] < told.risk[1]
     np.testing.assert_allclose(told.mean_risk, [0.9 * (4.0 + 1 / 3), 0.2 * (4.0 + 2 / 3)], rtol=1e-6)
+    assert told.best(np.zeros(2)) == (1, False)
+
+
+def test_where_every_tail_touches_somebody_a_trap_counts_for_half_a_collision():
+    into_a_trap, past = [(-0.1, 10), (0.0, 90)], [(-0.1, 40), (0.5, 60)]
+    told = evaluation_of(into_a_trap, past)
+    np.testing.assert_allclose(told.mean_risk[0], 0.1 * (4.0 + 1 / 3) + 0.9 * 2.5, rtol=1e-5)
     assert told.best(np.zeros(2)) == (1, False)
 
 
