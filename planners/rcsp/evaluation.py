@@ -41,10 +41,12 @@ class Evaluation:
     objective: F64  # (commands,), J
     reward: F64  # (commands,), R
     risk: F64  # (commands,), the risk measure of G
-    mean_risk: F64  # (commands,), the mean of G over all scenarios
     room_m: F64  # (commands,), mean clearance of the tail, up to where there is no risk
     free: NDArray[np.bool_]  # (commands,), whether fewer scenarios than make a tail touch anything
     clearance: F32  # (commands, scenarios), tail first
+    static_m: F32  # (commands,), to what stands still
+    brakable: NDArray[np.bool_]  # (commands,)
+    form: Risk
     futures: Futures
     tail: int  # scenarios in it
     static_safe_m: float  # clearance beyond which what stands still was no risk
@@ -58,8 +60,15 @@ class Evaluation:
         """
         if self.free.any():
             return int(np.argmax(np.where(self.free, self.objective, -np.inf))), True
-        risk = np.rint(1e6 * self.mean_risk)
+        risk = np.rint(1e6 * self.mean_risks(slice(None)))
         return int(np.argmin(np.where(risk == risk.min(), effort, np.inf))), False
+
+    def mean_risks(self, commands: slice) -> F64:
+        """Return the mean of G over all scenarios, shape (commands,)."""
+        risks: F64 = mean_risks(
+            self.clearance[commands], self.static_m[commands], self.brakable[commands], self.form, self.static_safe_m
+        )
+        return risks
 
 
 class Evaluator:
@@ -96,10 +105,11 @@ class Evaluator:
         futures, clearance = self._held_against(rolled, path_of(rolled, nominal), scenarios, chance, walls)
         tail = tail_of(s.risk, scenarios)
         risk, tail_room_m, free = tails(clearance, rolled.static_m, rolled.brakable, tail, self._risk, static_safe_m)
-        mean = mean_risks(clearance, rolled.static_m, rolled.brakable, self._risk, static_safe_m)
+        objective = reward - s.risk.weight * risk
         return Evaluation(
-            reward - s.risk.weight * risk, reward, risk, mean, tail_room_m, free, clearance, futures, tail, static_safe_m
-        )
+            objective, reward, risk, tail_room_m, free, clearance, rolled.static_m, rolled.brakable, self._risk, futures, tail,
+            static_safe_m,
+        )  # fmt: skip
 
     def static_safe_m(self, room_m: float) -> float:
         """Return the clearance beyond which what stands still is no risk, on a way that has so little room.

@@ -172,7 +172,7 @@ class Rcsp:
             objective=float(told.objective[chosen]),
             progress=float(told.reward[chosen]),
             cvar=float(told.risk[chosen]),
-            mean_risk=float(told.mean_risk[chosen]),
+            mean_risk=float(told.mean_risks(slice(chosen, chosen + 1))[0]),
             tail_room_m=float(told.room_m[chosen]),
             free=int(told.free.sum()),
             obstacles=position.shape[1],

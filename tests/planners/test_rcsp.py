@@ -24,7 +24,6 @@ from planners.rcsp.kernels import (
     clearances,
     largest,
     lower_at_rest,
-    mean_risks,
     risk_of,
     tails,
 )
@@ -321,23 +320,22 @@ def evaluation_of(*commands):
     count, n = clearance.shape
     room_m, brakable, risk = np.ones(count, np.float32), np.ones(count, np.bool_), Risk(NEAR_MISS, 0.4, 3.0, 0.3)
     told = tails(clearance, room_m, brakable, 10, risk, 0.15)
-    mean = mean_risks(clearance, room_m, brakable, risk, 0.15)
     nobody = Futures(np.zeros((1, 0, 2, n), np.float32), np.zeros(0), np.zeros((0, n), np.int64))
-    return Evaluation(-told[0], np.zeros(count), told[0], mean, told[1], told[2], clearance, nobody, 10, 0.15)
+    return Evaluation(-told[0], np.zeros(count), told[0], told[1], told[2], clearance, room_m, brakable, risk, nobody, 10, 0.15)
 
 
 def test_where_every_tail_touches_somebody_the_less_likely_collision_is_taken():
     likely, deeper = [(-0.1, 90), (0.5, 10)], [(-0.2, 20), (0.5, 80)]
     told = evaluation_of(likely, deeper)
     assert told.risk[0] < told.risk[1]
-    np.testing.assert_allclose(told.mean_risk, [0.9 * (4.0 + 1 / 3), 0.2 * (4.0 + 2 / 3)], rtol=1e-6)
+    np.testing.assert_allclose(told.mean_risks(slice(None)), [0.9 * (4.0 + 1 / 3), 0.2 * (4.0 + 2 / 3)], rtol=1e-6)
     assert told.best(np.zeros(2)) == (1, False)
 
 
 def test_where_every_tail_touches_somebody_a_trap_counts_for_half_a_collision():
     into_a_trap, past = [(-0.1, 10), (0.0, 90)], [(-0.1, 40), (0.5, 60)]
     told = evaluation_of(into_a_trap, past)
-    np.testing.assert_allclose(told.mean_risk[0], 0.1 * (4.0 + 1 / 3) + 0.9 * 2.5, rtol=1e-5)
+    np.testing.assert_allclose(told.mean_risks(slice(1)), 0.1 * (4.0 + 1 / 3) + 0.9 * 2.5, rtol=1e-5)
     assert told.best(np.zeros(2)) == (1, False)
 
 
