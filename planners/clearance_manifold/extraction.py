@@ -13,6 +13,7 @@ from planners.clearance_manifold.ridge_kernels import (
     Demand,
     Ground,
     Sections,
+    across,
     along_manifold,
     ample_boxes,
     boxes,
@@ -30,6 +31,7 @@ CURVATURE_LENGTH_M = 0.5  # at which curvature costs as much as slope
 CENTRING = 0.05
 TURN = 1.5
 ENCOUNTER_S = 3.0  # how far ahead a side is chosen for
+SIDE_S = 6.0  # and how far ahead one that was chosen is kept: from where who walks slowly comes into view
 LIKING = 0.3
 
 
@@ -88,6 +90,7 @@ class Solver:
         ahead = Sections(*(part[own : scene.end] for part in scene.sections))
         apart = encounters(ahead, self._offsets, scene.robot, scene.speed_m_s, ENCOUNTER_S, scene.closing)
         costs = station_costs(profiles(scene.ground, ahead, self._offsets), apart, self._offsets, self._demand)
+        costs += across(ahead, self._offsets, scene.robot, scene.speed_m_s, SIDE_S, scene.closing)
         if liked is not None:
             wanted = liked[own : scene.end, None]
             costs += np.where(np.isfinite(wanted), LIKING * np.abs(self._offsets - wanted), 0.0)

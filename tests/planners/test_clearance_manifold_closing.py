@@ -7,7 +7,7 @@ from drivers.interface.geometry import SE2
 from estimators.belief import ClearanceField, Lattice
 from planners.clearance_manifold.control_kernels import give_way, known_way
 from planners.clearance_manifold.recent_rate import WINDOW_S, RecentRate
-from planners.clearance_manifold.ridge_kernels import BODY_M, Sections, encounters
+from planners.clearance_manifold.ridge_kernels import BEGIN, BODY_M, CROSS, Sections, across, encounters
 
 OFFSETS = np.linspace(-1.0, 1.0, 5)
 CELL_M = 0.05
@@ -49,14 +49,17 @@ def test_what_was_taken_in_goes_on_from_a_snapshot():
     assert (rate.update(*later) == other.update(*later)).all()
 
 
-def apart_at(xs, closing):
-    sections = Sections(
+def sections_at(xs):
+    return Sections(
         np.stack((np.array(xs), np.zeros(len(xs))), axis=1),
         np.tile([0.0, 1.0], (len(xs), 1)),
         np.zeros((len(xs), 2)),
         np.full((len(xs), 1, 2), np.nan),
     )
-    return encounters(sections, OFFSETS, np.zeros(2), 0.5, 3.0, np.array([*closing, 20.0]))
+
+
+def apart_at(xs, closing):
+    return encounters(sections_at(xs), OFFSETS, np.zeros(2), 0.5, 3.0, np.array([*closing, 20.0]))
 
 
 def test_a_place_that_somebody_still_comes_to_is_taken_however_late_the_robot_is():
@@ -71,6 +74,22 @@ def test_a_place_that_somebody_still_comes_to_is_taken_however_late_the_robot_is
 def test_beyond_the_horizon_he_counts_where_he_is_by_then():
     apart = apart_at([1.0], (1.0, -3.0, 0.0, 0.5))[0]
     assert apart == pytest.approx(OFFSETS + 1.5 - BODY_M)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize(("begun_m", "kept"), [(0.05, False), (0.3, True), (1.2, False)])
+def test_who_has_begun_to_let_somebody_pass_keeps_to_that_side_of_his_line_until_he_is_past(side, begun_m, kept):
+    """He comes along y = 0 at 0.6 m/s from 2 m ahead; the robot has begun to go to one side, or not, or is far from him."""
+    sections = sections_at([0.0, 0.5, 1.8])
+    cost = across(sections, OFFSETS, np.array([0.0, begun_m * side]), 0.4, 6.0, np.array([2.0, 0.0, -0.6, 0.0, 20.0]))
+    other = OFFSETS * side < 0.0
+    assert cost[0] == pytest.approx(np.where(other & kept, BEGIN, 0.0))  # it is not there
+    assert cost[1] == pytest.approx(np.where(other & kept, CROSS, 0.0))
+    assert not cost[:, ~other].any()
+    assert not cost[2].any()  # he is past there before the robot can be
+    assert not across(sections, OFFSETS, np.array([0.0, begun_m * side]), 0.4, 6.0, np.array([-2.0, 0.0, -0.6, 0.0, 20.0])).any()
+    crossing = np.array([1.0, -1.0, -0.4, 0.4, 20.0])
+    assert not across(sections, OFFSETS, np.array([0.0, begun_m * side]), 0.4, 6.0, crossing).any()
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.7, -2.5])
