@@ -13,6 +13,7 @@ Where the paper leaves a choice, or its word does not carry over:
 - Layers of 0.10 m would make every wall 0.10 m thick as soon as it leaves the view, and the field would jump.  Which cells of
   the finer grid were last seen occupied is kept beside them; the layers say for how long that is believed.
 - Seen free makes free at once, but not in the blind zone right before the sensor, where an obstacle gives no return.
+- Who came on into that zone can be carried on (`oncoming`): his last cells stay, and his front goes on before them.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from drivers.interface.errors import ConfigurationError
@@ -27,14 +29,16 @@ from drivers.interface.geometry import SE2
 from drivers.interface.samples import frozen_array
 from drivers.interface.settings import Settings
 from drivers.interface.stateful import pack, unpack
-from estimators.belief import OCCUPIED, UNKNOWN, Lattice, Mask, OccupancyGrid
+from estimators.belief import F64, FREE, OCCUPIED, UNKNOWN, Lattice, Mask, OccupancyGrid
 from estimators.grid.labelling import FrameLabels
 from estimators.memory.field_memory_kernels import fold_layers
 from estimators.memory.memory_kernels import free_disc, in_the_open
+from estimators.memory.oncoming import Oncoming
 from estimators.memory.remembered import Remembered
 from estimators.memory.rolling import cells_between, lattice_around, strays, transfer
 
 NEVER_NS = -(2**62)
+SECOND_NS = 1_000_000_000
 STEP_NS = 200_000_000  # the period that the paper's retentions are meant for
 
 
@@ -47,6 +51,7 @@ class FieldMemorySettings(Settings):
     dynamic_retention: float = Field(default=0.5, gt=0.0, lt=1.0, description="of the dynamic layer, per 0.2 s")
     static_gain: float = Field(default=0.05, gt=0.0, le=1.0, description="gain per 0.2 s of what came where it was free")
     recently_free_s: float = Field(default=3.0, ge=0.0, le=3600.0, description="how long ago 'it was free' counts")
+    carry_s: float = Field(default=0.0, ge=0.0, le=10.0, description="how long who came on into the blind zone goes on; 0: not")
     threshold: float = Field(default=0.3, gt=0.0, lt=1.0, description="evidence from which an unseen cell is occupied")
 
 
@@ -77,6 +82,7 @@ class FieldMemory:
         self._static, self._dynamic = (np.zeros((layers, layers), dtype=np.float32) for _ in range(2))
         self._free_ns, self._stamp_ns = (np.full((layers, layers), NEVER_NS, dtype=np.int64) for _ in range(2))
         self._frame_ns = NEVER_NS
+        self._oncoming, self._carried = Oncoming(settings.carry_s), np.zeros((0, 2))  # cells that he was carried to, in odom
         self._clear_footprint(SE2())
 
     @property
@@ -131,6 +137,7 @@ class FieldMemory:
         self._roll(odom_from_base)
         settings, scale = self._settings, self._scale
         steps = min((stamp_ns - self._frame_ns) / STEP_NS, 1.0)  # a pause is no evidence
+        self._mark(self._carried, OCCUPIED, FREE)
         corner, block = self._block()
         source = frame.grid.lattice
         fold_layers(
@@ -152,7 +159,31 @@ class FieldMemory:
             settings.threshold,
         )
         self._frame_ns = stamp_ns
+        self._carry(frame, stamp_ns, odom_from_base)
         self._clear_footprint(odom_from_base)
+
+    def _carry(self, frame: FrameLabels, stamp_ns: int, odom_from_base: SE2) -> None:
+        """Mark the free cells of the blind zone that somebody who came on into it must have got to."""
+        if self._settings.carry_s <= 0.0:
+            return
+        source, robot = frame.grid.lattice, np.array([odom_from_base.x, odom_from_base.y])
+        rows, columns = np.nonzero(frame.grid.label == OCCUPIED)
+        cells = source.centres(rows, columns)
+        inside, at = _inside(self._layers, cells)
+        came = np.zeros(len(cells), np.bool_)
+        came[inside] = self._static[at] < self._settings.threshold
+        front = self._oncoming.update(cells[came], robot, stamp_ns / SECOND_NS)
+        within, at = _inside(source, front)
+        front = front[within][frame.blind[at]]
+        self._carried = self._mark(front, FREE, OCCUPIED)
+
+    def _mark(self, points: F64, what: int, label: int) -> F64:
+        """Overwrite the labels at points, shape (n, 2), where they are `what`; return those, shape (m, 2)."""
+        within, at = _inside(self._cells, points)
+        changes = self._label[at] == what
+        rows, columns = at
+        self._label[rows[changes], columns[changes]] = label
+        return np.asarray(points[within][changes])
 
     def _block(self) -> tuple[tuple[int, int], Lattice]:
         """Return where the layers' cells under the window begin, by row and column, and their lattice in finer cells."""
@@ -180,6 +211,8 @@ class FieldMemory:
             free_ns=self._free_ns,
             stamp_ns=self._stamp_ns,
             frame_ns=self._frame_ns,
+            carried=self._carried,
+            **self._oncoming.state(),
         )
 
     def restore(self, snapshot: bytes) -> None:
@@ -190,3 +223,12 @@ class FieldMemory:
         self._layers = Lattice(lx, ly, layers.cell_m, layers.rows, layers.columns)
         self._label, self._static, self._dynamic = state["label"], state["static"], state["dynamic"]
         self._free_ns, self._stamp_ns, self._frame_ns = state["free_ns"], state["stamp_ns"], int(state["frame_ns"])
+        self._carried = state["carried"]
+        self._oncoming.take(state)
+
+
+def _inside(lattice: Lattice, points: F64) -> tuple[Mask, tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    """Return which points, shape (n, 2), lie on a lattice, shape (n,), and the rows and columns of those."""
+    rows, columns = lattice.cell_of(points)
+    inside = (rows >= 0) & (rows < lattice.rows) & (columns >= 0) & (columns < lattice.columns)
+    return inside, (rows[inside], columns[inside])
