@@ -189,7 +189,7 @@ def test_names_that_nothing_answers_to_are_refused(change: dict, said: str) -> N
 
 def test_the_shipped_experiment_runs_720_times_and_more_with_imported_worlds() -> None:
     assert load_evaluation("rcsp", None, ()).steps == 30 * (2 * 8 + 8)
-    assert load_evaluation("rcsp", None, (f"files.dynabarn={DYNABARN}",)).steps == 720 + 2 * 5 * (8 + 4)
+    assert load_evaluation("rcsp", None, (f"files.dynabarn={DYNABARN}",)).steps == 720 + 2 * 5 * (6 + 2)
     with pytest.raises(ConfigurationError, match=r"nowhere\.json cannot be read"):
         load_evaluation("rcsp", None, ("files.barn=nowhere.json",))
 
