@@ -45,7 +45,9 @@ def warm_up() -> None:
     """Compile every kernel."""
     nothing = OccupancyGrid(Lattice(0.0, 0.0, 1.0, 8, 8), frozen_array(np.zeros((8, 8), dtype=np.uint8)))
     Traces().moving(nothing, np.zeros((8, 8), dtype=np.int32), np.zeros(1), 0)
-    centre_of(np.ones((1, 2)), 0.0, 0.0, outline_of(np.ones((1, 2)), 0.0, 0.0, nothing.label, 0.0, 0.0, 1.0), 1.0)
+    outline = outline_of(np.ones((1, 2)), 0.0, 0.0, nothing.label, 0.0, 0.0, 1.0)
+    bearing_of(outline, 1.0)
+    centre_of(np.ones((1, 2)), 0.0, 0.0, outline, 1.0)
 
 
 def sensor_of(lattice: Lattice) -> tuple[float, float]:
