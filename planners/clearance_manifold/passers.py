@@ -20,6 +20,7 @@ LOOKS = 15  # seen fewer times than this he may be the noise of a wall seen at a
 NOISE_S = 2.0  # which is forgotten after so long,
 MOST_M_S = 2.0  # and so may who is faster
 KEPT_LOOKS = 200.0  # that a line is made of: odometry turns beneath it
+MIDDLE_M = 0.75  # who walks farther from the middle of a corridor is the noise of its walls
 LINES = 3  # that can lead by one place
 SECOND_NS = 1_000_000_000
 SUMS = 6  # of a line: number of looks, x, y, x^2, x y, y^2, about where it begins
@@ -143,9 +144,10 @@ class Passers:
             s = self._settings
             right_m, left_m = walls(ground, at, normal, s.widest_m).T
             corridor = (right_m + left_m >= s.narrowest_m) & (right_m + left_m <= s.widest_m)
-            expected = corridor & np.isnan(taken[:, :, 0]).all(axis=1)
-            middle = 0.5 * (left_m[expected] - right_m[expected])
-            taken[expected, 0] = middle[:, None] + s.half_width_m * np.array([-1.0, 1.0])
+            middle = 0.5 * (np.where(corridor, left_m, 0.0) - np.where(corridor, right_m, 0.0))
+            seen = (np.abs(taken.mean(axis=2) - middle[:, None]) < MIDDLE_M).any(axis=1)  # not the noise of its walls
+            expected = corridor & ~seen
+            taken[expected, -1] = middle[expected, None] + s.half_width_m * np.array([-1.0, 1.0])
         return taken
 
     def state(self) -> dict[str, NDArray[Any]]:

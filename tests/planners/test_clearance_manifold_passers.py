@@ -60,7 +60,7 @@ def test_who_crosses_the_way_or_walks_far_beside_it_takes_nothing_up():
 def test_where_nobody_was_seen_people_are_expected_in_the_middle_of_corridors_only():
     passers, shifted = Passers(PasserSettings(middle=True)), AT + np.array([0.0, 0.3])
     taken = passers.across(shifted, NORMAL, ground_of(belief_of(WALLS)))
-    assert taken[:, 0] == pytest.approx(np.tile([-0.3 - HALF_M, -0.3 + HALF_M], (2, 1)), abs=0.06)
+    assert taken[:, -1] == pytest.approx(np.tile([-0.3 - HALF_M, -0.3 + HALF_M], (2, 1)), abs=0.06)
     assert np.isnan(passers.across(AT, NORMAL, ground_of(OPEN))).all()
     assert walls(ground_of(belief_of(WALLS)), shifted, NORMAL, 3.0) == pytest.approx(np.tile([1.5, 0.9], (2, 1)), abs=0.06)
     assert np.isinf(walls(ground_of(belief_of(WALLS)), AT, NORMAL, 1.0)).all()
@@ -123,3 +123,9 @@ def test_who_was_seen_lately_is_expected_where_he_goes(at_m, until_s, comes):
     """After 40 looks at 0.8 m/s from -2 m on, and a second unseen, he is at 0.4 m; apart_m is 0.9 m."""
     assert walked(40, 0.0).comes(np.array([[at_m, 0.0]]), until_s) == comes
     assert not walked(40, 0.0, expect_s=0.5).comes(np.array([[at_m, 0.0]]), until_s)
+
+
+def test_the_noise_of_a_corridors_wall_does_not_stand_for_who_is_expected_in_its_middle():
+    taken = walked(40, 1.1, middle=True).across(AT, NORMAL, ground_of(belief_of(WALLS)))
+    assert taken[:, -1] == pytest.approx(np.tile([-HALF_M, HALF_M], (2, 1)), abs=0.06)
+    assert np.isnan(walked(40, 0.3, middle=True).across(AT, NORMAL, ground_of(belief_of(WALLS)))[:, -1]).all()
