@@ -51,7 +51,7 @@ class FieldMemorySettings(Settings):
     dynamic_retention: float = Field(default=0.5, gt=0.0, lt=1.0, description="of the dynamic layer, per 0.2 s")
     static_gain: float = Field(default=0.05, gt=0.0, le=1.0, description="gain per 0.2 s of what came where it was free")
     recently_free_s: float = Field(default=3.0, ge=0.0, le=3600.0, description="how long ago 'it was free' counts")
-    carry_s: float = Field(default=0.0, ge=0.0, le=10.0, description="how long who came on into the blind zone goes on; 0: not")
+    carry_s: float = Field(default=1.5, ge=0.0, le=10.0, description="how long who came on into the blind zone goes on; 0: not")
     threshold: float = Field(default=0.3, gt=0.0, lt=1.0, description="evidence from which an unseen cell is occupied")
 
 

@@ -23,7 +23,7 @@ from planners.clearance_manifold.control_kernels import brakable
 from planners.clearance_manifold.controller import ManifoldController, Situation
 from planners.clearance_manifold.diagnostics import ManifoldDiagnostics, diagnose
 from planners.clearance_manifold.drawings import drawn
-from planners.clearance_manifold.extraction import Scene, Solver
+from planners.clearance_manifold.extraction import SIDE_S, Scene, Solver
 from planners.clearance_manifold.governor import Around, Governor
 from planners.clearance_manifold.lookout import Lookout, Outlook
 from planners.clearance_manifold.lookout_kernels import Seen
@@ -31,7 +31,7 @@ from planners.clearance_manifold.manifold import Stations
 from planners.clearance_manifold.prediction import ArrivalField, Predicted
 from planners.clearance_manifold.properties import check
 from planners.clearance_manifold.reading import Reader
-from planners.clearance_manifold.ridge_kernels import Ground, Sections
+from planners.clearance_manifold.ridge_kernels import Ground, Sections, side_of
 from planners.clearance_manifold.settings import ClearanceManifoldSettings
 from planners.clearance_manifold.tracker import Category, Continuation, Tracker
 from planners.clearance_manifold.waiting import Waiting
@@ -88,7 +88,7 @@ class ClearanceManifold:
         self._waiting.over()
         pose = belief.odom_from_base
         point = self._control_point(pose)
-        new_goal = self._follow_route(route, point)
+        new_goal = self._follow_route(route, point, predicted.closing)
         assert self._chart is not None
         scene = self._scene(self._chart, predicted, belief, point)
         told = self._tracker.advance(scene, belief, new_goal)
@@ -132,14 +132,19 @@ class ClearanceManifold:
         ahead_m = 0.0 if self._limits.holonomic else self._settings.controller.look_ahead_m
         return np.array([pose.x + ahead_m * math.cos(pose.yaw), pose.y + ahead_m * math.sin(pose.yaw)])
 
-    def _follow_route(self, route: Route, point: F64) -> bool:
-        """Keep the chart, or lay a new one where the route left it; return whether the goal is another."""
+    def _follow_route(self, route: Route, point: F64, closing: F64) -> bool:
+        """Keep the chart, or lay a new one where the route left it; return whether the goal is another.
+
+        The route leads around who comes along the way, shape (5,), as if he stood, now on one side of him and now on the other.
+        """
         assert route.goal_in_odom is not None
         goal = np.array(route.goal_in_odom)
         moved_m = math.inf if self._chart is None else float(np.hypot(*(goal - self._chart.goal)))
         if self._chart is not None and moved_m < self._settings.chart.escape_m:
             self._arc_m = float(self._chart.project(point[None], self._arc_m)[0, 0])
-            if moved_m < 0.05 and not self._escapes(self._chart, route.path_in_odom):
+            normal = self._chart.frames(np.array([self._arc_m]), 1.0)[1][0]
+            met = math.isfinite(side_of(point, normal, SIDE_S, closing))
+            if moved_m < 0.05 and (met or not self._escapes(self._chart, route.path_in_odom)):
                 return False
         behind = self._behind(point, route.path_in_odom)
         self._chart = lay_chart(route.path_in_odom, goal, behind, self._settings.chart)

@@ -213,6 +213,25 @@ def encounters(sections: Sections, offsets: F64, robot: F64, speed_m_s: float, h
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def side_of(robot: F64, normal: F64, horizon_s: float, closing: F64) -> float:
+    """Return how far to his left the robot is off the line of who comes along the way [m], NaN where nobody comes near it.
+
+    Args:
+        robot: in odom, shape (2,).
+        normal: of the way where the robot is, to its left, unit, shape (2,).
+        horizon_s: who comes later does not count.
+        closing: middle, velocity and number of cells of the boundary, shape (5,).
+    """
+    speed2 = closing[2] * closing[2] + closing[3] * closing[3]
+    if closing[4] == 0.0 or speed2 < 0.01:
+        return float(np.nan)
+    x, y, speed = robot[0] - closing[0], robot[1] - closing[1], np.sqrt(speed2)
+    side, time_s = float((y * closing[2] - x * closing[3]) / speed), (x * closing[2] + y * closing[3]) / speed2
+    along = abs(closing[2] * normal[0] + closing[3] * normal[1]) <= ALONG * speed
+    return side if along and abs(side) < FAR_M and 0.0 < time_s < horizon_s else float(np.nan)
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def across(sections: Sections, offsets: F64, robot: F64, speed_m_s: float, horizon_s: float, closing: F64) -> F64:
     """Return what it costs to change the side of who comes along the way, shape (n, m), where he still comes by.
 
@@ -228,15 +247,11 @@ def across(sections: Sections, offsets: F64, robot: F64, speed_m_s: float, horiz
         closing: middle, velocity and number of cells of the boundary, shape (5,).
     """
     cost = np.zeros((len(sections.at), len(offsets)))
+    side = side_of(robot, sections.normal[0], horizon_s, closing)
+    if not abs(side) > COMMITTED_M:  # nobody comes, or it has not begun
+        return cost
     speed2 = closing[2] * closing[2] + closing[3] * closing[3]
-    if closing[4] == 0.0 or speed2 < 0.01:
-        return cost
     left_x, left_y = -closing[3] / np.sqrt(speed2), closing[2] / np.sqrt(speed2)
-    x, y = robot[0] - closing[0], robot[1] - closing[1]
-    side, time_s = x * left_x + y * left_y, (x * closing[2] + y * closing[3]) / speed2
-    along = abs(closing[2] * sections.normal[0, 0] + closing[3] * sections.normal[0, 1]) <= ALONG * np.sqrt(speed2)
-    if not (along and COMMITTED_M < abs(side) < FAR_M and 0.0 < time_s < horizon_s):
-        return cost
     for i in range(len(sections.at)):
         for j in range(len(offsets)):
             x = sections.at[i, 0] + offsets[j] * sections.normal[i, 0]

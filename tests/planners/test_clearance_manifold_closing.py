@@ -7,7 +7,7 @@ from drivers.interface.geometry import SE2
 from estimators.belief import ClearanceField, Lattice
 from planners.clearance_manifold.control_kernels import give_way, known_way
 from planners.clearance_manifold.recent_rate import WINDOW_S, RecentRate
-from planners.clearance_manifold.ridge_kernels import BEGIN, BODY_M, CROSS, Sections, across, encounters
+from planners.clearance_manifold.ridge_kernels import BEGIN, BODY_M, CROSS, FAR_M, Sections, across, encounters, side_of
 
 OFFSETS = np.linspace(-1.0, 1.0, 5)
 CELL_M = 0.05
@@ -90,6 +90,24 @@ def test_who_has_begun_to_let_somebody_pass_keeps_to_that_side_of_his_line_until
     assert not across(sections, OFFSETS, np.array([0.0, begun_m * side]), 0.4, 6.0, np.array([-2.0, 0.0, -0.6, 0.0, 20.0])).any()
     crossing = np.array([1.0, -1.0, -0.4, 0.4, 20.0])
     assert not across(sections, OFFSETS, np.array([0.0, begun_m * side]), 0.4, 6.0, crossing).any()
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.7, -2.5])
+def test_of_who_comes_along_the_way_it_is_known_on_which_side_the_robot_is(yaw):
+    """He comes from 2 m ahead at 0.6 m/s; his left is the robot's right."""
+    turned = SE2(0.0, 0.0, yaw)
+    normal = turned.apply(np.array([0.0, 1.0]))
+
+    def side(aside_m, place=(2.0, 0.0), velocity=(-0.6, 0.0), cells=20.0, horizon_s=6.0):
+        closing = np.concatenate((turned.apply(np.array(place)), turned.apply(np.array(velocity)), (cells,)))
+        return side_of(turned.apply(np.array([0.0, aside_m])), normal, horizon_s, closing)
+
+    assert [side(aside_m) for aside_m in (0.3, 0.0, -0.3)] == pytest.approx([-0.3, 0.0, 0.3])
+    assert np.isnan(side(FAR_M + 0.01))  # he is nobody's
+    assert np.isnan(side(0.0, velocity=(0.6, 0.0)))  # he goes away
+    assert np.isnan(side(0.0, place=(2.0, -2.0), velocity=(-0.6, 0.6)))  # he crosses
+    assert np.isnan(side(0.0, horizon_s=3.0))  # that is not soon
+    assert np.isnan(side(0.0, cells=0.0))  # there is nobody
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.7, -2.5])
