@@ -95,13 +95,6 @@ class ManifoldController:
         vx, vy = within(float(u[0]), float(u[1]), low_x, cap.vx, cap.vy)
         return BodyTwist(max(vx, low_x, -cap.vx if self._limits.reverse else 0.0), vy, self.turn(at, yaw)), k
 
-    def step(self, u: F64, yaw: float, behind_m: float) -> BodyTwist:
-        """Return the twist that moves the base with a velocity u, shape (2,), in odom, or turns it there; it may back off."""
-        body = SE2(0.0, 0.0, -yaw).apply(u)
-        if not self._limits.holonomic:
-            return self._differential.twist(body, float(np.hypot(*u)), 0.0, behind_m)
-        return BodyTwist(float(body[0]), float(body[1]), 0.0)
-
     def _push(self, error: F64, jerk_m_s3: float) -> F64:
         """Return equation 4's velocity towards the manifold, shape (2,), in odom, if it can still end there with that jerk."""
         error_m, gain_per_s = float(np.hypot(*error)), self._settings.lateral_gain_per_s

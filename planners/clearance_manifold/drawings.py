@@ -23,7 +23,7 @@ def drawn(scene: Scene, manifold: Manifold, tube_m: float, closing: F64, look_at
         look_at: what is turned to, shape (2,), in odom.
     """
     ahead = manifold.ahead
-    at, normal, reach, _ = (part[ahead] for part in scene.sections)
+    at, normal, reach = (part[ahead] for part in scene.sections)
     offset = manifold.offset_m[ahead, None]
     lines = [
         Drawing("centre_line", scene.sections.at),

@@ -66,9 +66,9 @@ class Solver:
         s, period_s = settings, setup.period_s
         self._settings, self._tracker, self._stations = settings, tracker, stations
         self.least_m = setup.robot_radius_m + s.margin_m
-        self.kept_m = max(self.least_m, setup.kept_clear_m)
-        ample_m = self.kept_m + s.ample_m
-        self._demand = Demand(self.least_m, self.kept_m, ample_m, max(s.ridge_enough_m, ample_m), CENTRING)
+        kept_m = max(self.least_m, setup.kept_clear_m)
+        ample_m = kept_m + s.ample_m
+        self._demand = Demand(self.least_m, kept_m, ample_m, max(s.ridge_enough_m, ample_m), CENTRING)
         self._step_towards_m = tracker.lipschitz_m_s * period_s
         self._offsets = np.linspace(-s.half_width_m, s.half_width_m, s.cross_samples)
         self._spacing = np.diff(stations.arcs_m[stations.own :])

@@ -32,7 +32,6 @@ class Outlook:
     demand_m_s: float = 0.0  # the walker who is reckoned with; 0: there is no opening
     waits: bool = False  # an opening is not clear
     creeps: bool = False  # and the robot is in it already, with nothing seen beside it
-    glance_rad: float | None = None  # where it looks round to, in odom
 
 
 class Lookout:

@@ -18,7 +18,6 @@ from drivers.interface.stateful import pack, unpack
 from estimators.belief import F64, Belief
 from estimators.field_query import sample
 from planners.clearance_manifold.chart import Chart, lay_chart
-from planners.clearance_manifold.company import Company
 from planners.clearance_manifold.control_kernels import brakable
 from planners.clearance_manifold.controller import ManifoldController, Situation
 from planners.clearance_manifold.diagnostics import ManifoldDiagnostics, diagnose
@@ -66,7 +65,6 @@ class ClearanceManifold:
         self._lookout = Lookout(settings.lookout, setup.limits, setup.robot_radius_m, settings.controller.speed_m_s)
         self._governor = Governor(settings.smoothness, setup.limits, setup.period_s)
         self._controller = ManifoldController(settings.controller, setup.limits, self._governor, setup.robot_radius_m)
-        self._company = Company(settings, setup.robot_radius_m, self._solver.kept_m)
         self._waiting = Waiting(settings.waiting, setup.limits.velocity.wz)
         self._chart: Chart | None = None
         self._arc_m = 0.0  # of the robot on the chart
@@ -81,7 +79,6 @@ class ClearanceManifold:
     def plan(self, belief: Belief, route: Route) -> Plan:
         """Return the twist along the manifold; zero, with the reason, where there is nothing to follow."""
         predicted = self._field.update(belief)
-        self._company.update(belief, self._setup.period_s)
         reason = self._refusal(belief, route)
         if reason:
             return self._wait(belief, reason, blocked=route.blocked)
@@ -108,10 +105,6 @@ class ClearanceManifold:
         if not blocked or self._chart is None:
             self._chart = None
             return Plan(BodyTwist(), diagnostics=diagnostics)
-        aside = self._company.step_aside(belief)
-        if aside is not None:
-            twist = self._controller.step(aside, belief.odom_from_base.yaw, self._reader.behind(belief))
-            return Plan(twist, diagnostics=diagnostics)
         twist = self._waiting.twist(self._chart, self._arc_m, self._settings.solver.horizon_m, self._solver.least_m, belief)
         return Plan(twist, diagnostics=diagnostics)
 
@@ -176,15 +169,13 @@ class ClearanceManifold:
     def _scene(self, chart: Chart, predicted: Predicted, belief: Belief, point: F64) -> Scene:
         lattice, s = belief.clearance.lattice, self._settings.solver
         arcs_m = self._arc_m + self._stations.arcs_m
-        at, normal, reach = chart.frames(arcs_m, s.half_width_m)
-        ground = Ground(predicted.clearance_m, lattice.x_m, lattice.y_m, lattice.cell_m)
-        sections = Sections(at, normal, reach, self._company.walked(at, normal, ground, chart.length_m - arcs_m))
+        sections = Sections(*chart.frames(arcs_m, s.half_width_m))
         age_s = sample(self._field.age_s, lattice, sections.at)
         confidence = np.exp(-age_s / self._settings.prediction.confidence_decay_s)
         own = self._stations.own
         lateral_m = float((point - sections.at[own]) @ sections.normal[own])
         return Scene(
-            ground,
+            Ground(predicted.clearance_m, lattice.x_m, lattice.y_m, lattice.cell_m),
             sections,
             arcs_m,
             confidence,
@@ -210,11 +201,7 @@ class ClearanceManifold:
         seen = Seen(field.known, field.clearance_m, self._field.age_s, lattice.x_m, lattice.y_m, lattice.cell_m)
         velocity = SE2(0.0, 0.0, belief.odom_from_base.yaw).apply(np.array([belief.twist.vx, belief.twist.vy]))
         along_m_s = max(0.0, float(velocity @ told.manifold.tangent()))
-        outlook = self._lookout.watch(seen, way, normal, along_m_s, self._setup.period_s)
-        if not self._settings.glance.enabled:
-            return outlook
-        door_m = self._company.doorways(self._chart, self._arc_m, scene.ground)
-        return self._company.outlook(scene, told.manifold, door_m, belief, outlook)
+        return self._lookout.watch(seen, way, normal, along_m_s, self._setup.period_s)
 
     def _plan(self, scene: Scene, told: Continuation, at: Situation, outlook: Outlook, command: tuple[BodyTwist, float]) -> Plan:
         s, manifold, (twist, speed) = self._settings, told.manifold, command
@@ -239,7 +226,6 @@ class ClearanceManifold:
             ticks=self._ticks,
             **self._field.state(),
             **self._tracker.state(),
-            **self._company.state(),
             **self._waiting.state(),
             **self._lookout.state(),
             **self._controller.state(),
@@ -252,7 +238,6 @@ class ClearanceManifold:
         self._arc_m, self._ticks = float(state["arc_m"]), state["ticks"]
         self._field.take(state)
         self._tracker.take(state)
-        self._company.take(state)
         self._waiting.take(state)
         self._lookout.take(state)
         self._controller.take(state)

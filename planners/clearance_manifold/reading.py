@@ -18,7 +18,6 @@ from planners.clearance_manifold.tracker import heading
 
 WAY_INSIDE_DEG = 10.0  # so far inside the edge of view the way ahead is kept while something else is watched
 LOOK_AT_MOST_DEG = 120.0  # what closes in from behind is not turned to
-WATCH_M = 2.0  # who closes in and is nearer than this is not turned away from
 TURNED_RAD = 0.1  # nearer than this it has turned
 BEHIND_M = 1.0  # so far back is looked for room to back off
 
@@ -53,10 +52,7 @@ class Reader:
         along_rad = heading(manifold.points[own : own + look])
         stale = self._strafes and self._stale(manifold, belief, met_s)
         heading_rad = self._look(along_rad, closing, point, None if stale else outlook.look_at)
-        stands = not self._strafes and outlook.creeps and self._looks_first(heading_rad, along_rad, belief.odom_from_base.yaw)
-        watched = closing[4] > 0.0 and float(np.hypot(*(closing[:2] - point))) < WATCH_M
-        if outlook.glance_rad is not None and not watched:
-            heading_rad, stands = outlook.glance_rad, True  # nobody drives where he does not look
+        stands = not self._strafes and self._looks_first(heading_rad, along_rad, belief.odom_from_base.yaw)
         return Situation(
             error=off - float(off @ tangent) * tangent,
             tangent=tangent,
@@ -64,14 +60,14 @@ class Reader:
             margin_m=float(clearance.min()) - self._least_m if clearance.size else 0.0,
             commitment=self._commitment(manifold, belief),
             free_m=self._free_length(manifold, belief, left_m),
-            clear_m=0.0 if stands else outlook.free_m,
+            clear_m=0.0 if stands and outlook.creeps else outlook.free_m,
             most_m_s=outlook.speed_m_s,
             heading_rad=heading_rad,
             feasible=manifold.valid > 1,
             robot=point,
             velocity=SE2(0.0, 0.0, belief.odom_from_base.yaw).apply(np.array([belief.twist.vx, belief.twist.vy])),
             closing=closing,
-            behind_m=0.0 if self._strafes else self.behind(belief),
+            behind_m=0.0 if self._strafes else self._behind(belief),
             stale=stale,
         )
 
@@ -88,7 +84,7 @@ class Reader:
         """Return whether there is something to look at aside, and the base has not turned to it yet."""
         return abs(wrap_angle(heading_rad - along_rad)) > TURNED_RAD and abs(wrap_angle(heading_rad - yaw)) > TURNED_RAD
 
-    def behind(self, belief: Belief) -> float:
+    def _behind(self, belief: Belief) -> float:
         """Return how far straight back the way is known and wide enough [m]."""
         pose, field = belief.odom_from_base, belief.clearance
         back = np.array([math.cos(pose.yaw), math.sin(pose.yaw)])

@@ -28,7 +28,6 @@ class Sections(NamedTuple):
     at: F64  # (n, 2), on the centre line
     normal: F64  # (n, 2), unit, to the left
     reach: F64  # (n, 2), lowest and highest offset looked at [m]
-    walked: F64  # (n, k, 2), lowest and highest offsets of where somebody walks up and down, NaN where nobody does [m]
 
 
 class Ground(NamedTuple):
@@ -61,39 +60,6 @@ def clearance_at(ground: Ground, sections: Sections, i: int, y: float) -> float:
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def beside(sections: Sections, i: int, y: float) -> float:
-    """Return how far an offset is from where somebody walks up and down, negative where he does, inf where nobody does [m]."""
-    nearest = np.inf
-    for k in range(sections.walked.shape[1]):
-        low, high = sections.walked[i, k, 0], sections.walked[i, k, 1]
-        if low <= high:
-            nearest = min(nearest, max(low - y, y - high))
-    return nearest
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def walls(ground: Ground, at: F64, normal: F64, widest_m: float) -> F64:
-    """Return how far the walls to the right and to the left of points are, shape (n, 2) [m], inf beyond `widest_m`.
-
-    Args:
-        ground: the field.
-        at: in odom, shape (n, 2).
-        normal: to the left, unit, shape (n, 2).
-        widest_m: how far is looked.
-    """
-    found, step = np.full((len(at), 2), np.inf), ground.cell_m
-    for i in range(len(at)):
-        for side in range(2):
-            sign = 1.0 if side else -1.0
-            for k in range(int(widest_m / step)):
-                x, y = at[i, 0] + sign * k * step * normal[i, 0], at[i, 1] + sign * k * step * normal[i, 1]
-                if bilinear(ground.clearance, ground.x_m, ground.y_m, ground.cell_m, x, y) < step:
-                    found[i, side] = k * step
-                    break
-    return found
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def worth(clearance: float, y: float, demand: Demand) -> float:
     """Return how good a ridge is: clearance as far as it counts, nearness to the centre line where it is enough."""
     return min(clearance, demand.enough_m) - demand.centring * abs(y)
@@ -106,12 +72,10 @@ def box_around(ground: Ground, sections: Sections, i: int, inside: float, step_m
     Source: Cui, Deng, Wang, proposition 1.  `inside` must have that clearance itself.
     """
     found = np.empty(3)
-    clearance = min(clearance_at(ground, sections, i, inside), beside(sections, i, inside))
-    best, ridge = worth(clearance, inside, demand), inside
+    best, ridge = worth(clearance_at(ground, sections, i, inside), inside, demand), inside
     for side in range(2):
         sign = 1.0 if side else -1.0
         end, y, before = sections.reach[i, side], inside, clearance_at(ground, sections, i, inside)
-        this_side = beside(sections, i, inside) >= 0.0  # of who walks up and down: the ridge is not looked for beyond him
         while sign * (end - y) > 1e-9:
             ahead = sign * min(sign * (y + sign * step_m), sign * end)
             here = clearance_at(ground, sections, i, ahead)
@@ -119,10 +83,8 @@ def box_around(ground: Ground, sections: Sections, i: int, inside: float, step_m
                 y += (ahead - y) * (before - demand.least_m) / max(before - here, 1e-9)
                 break
             y, before = ahead, here
-            aside = beside(sections, i, y)
-            this_side &= aside >= 0.0
-            value = worth(min(here, aside), y, demand)
-            if value > best and (this_side or beside(sections, i, inside) < 0.0):
+            value = worth(here, y, demand)
+            if value > best:
                 best, ridge = value, y
         found[side] = y
     found[2] = ridge
@@ -144,10 +106,7 @@ def ample_boxes(ground: Ground, sections: Sections, found: F64, step_m: float, d
     for i in range(len(found)):
         if not np.isfinite(found[i, 2]):
             continue
-        top = min(clearance_at(ground, sections, i, found[i, 2]), beside(sections, i, found[i, 2]))
-        aside = top >= demand.least_m  # there is room beside who walks up and down here
-        if not aside:
-            top = clearance_at(ground, sections, i, found[i, 2])
+        top = clearance_at(ground, sections, i, found[i, 2])
         level = min(demand.ample_m, 0.5 * (demand.least_m + top))
         for side in range(2):
             sign = 1.0 if side else -1.0
@@ -155,8 +114,6 @@ def ample_boxes(ground: Ground, sections: Sections, found: F64, step_m: float, d
             while sign * (end - y) > 1e-9:
                 ahead = sign * min(sign * (y + sign * step_m), sign * end)
                 here = clearance_at(ground, sections, i, ahead)
-                if aside:
-                    here = min(here, beside(sections, i, ahead))
                 if here < level:
                     y += (ahead - y) * (before - level) / max(before - here, 1e-9)
                     break
@@ -181,8 +138,6 @@ def profiles(ground: Ground, sections: Sections, offsets: F64) -> F64:
 def encounters(sections: Sections, offsets: F64, robot: F64, speed_m_s: float, horizon_s: float, closing: F64) -> F64:
     """Return how near what closes in comes to every station and offset once the robot can be there, shape (n, m) [m].
 
-    Where somebody walks up and down counts as if he were there all the time.
-
     The robot may be later than it hopes, as it yields; so all that comes there after its earliest arrival counts: a branch that
     crosses before somebody is bad for as long as he is on his way, one that crosses behind him is free once he is past.
 
@@ -194,10 +149,7 @@ def encounters(sections: Sections, offsets: F64, robot: F64, speed_m_s: float, h
         horizon_s: how far it is extrapolated.
         closing: middle, velocity and number of cells of the boundary, shape (5,).
     """
-    apart = np.empty((len(sections.at), len(offsets)))
-    for i in range(len(sections.at)):
-        for j in range(len(offsets)):
-            apart[i, j] = beside(sections, i, offsets[j])
+    apart = np.full((len(sections.at), len(offsets)), np.inf)
     if closing[4] == 0.0:
         return apart
     speed2 = max(closing[2] * closing[2] + closing[3] * closing[3], 1e-6)
@@ -208,7 +160,7 @@ def encounters(sections: Sections, offsets: F64, robot: F64, speed_m_s: float, h
             first = min(EARLY * np.hypot(x - robot[0], y - robot[1]) / speed_m_s, horizon_s)
             nearest = ((x - closing[0]) * closing[2] + (y - closing[1]) * closing[3]) / speed2
             t = min(max(nearest, first), horizon_s)
-            apart[i, j] = min(apart[i, j], np.hypot(x - closing[0] - closing[2] * t, y - closing[1] - closing[3] * t) - BODY_M)
+            apart[i, j] = np.hypot(x - closing[0] - closing[2] * t, y - closing[1] - closing[3] * t) - BODY_M
     return apart
 
 
@@ -346,7 +298,7 @@ def repair(ground: Ground, sections: Sections, i: int, y: float, tube_m: float, 
     for k in range(2 * _FINE + 1):
         at = low + (high - low) * k / (2.0 * _FINE)
         rho = clearance_at(ground, sections, i, at)
-        value = worth(min(rho, beside(sections, i, at)), at, demand) - hysteresis * abs(at - y)
+        value = worth(rho, at, demand) - hysteresis * abs(at - y)
         if rho >= demand.least_m and value > best:
             best, found = value, at
     return found

@@ -169,37 +169,6 @@ class LookoutSettings(Settings):
     reaction_s: float = Field(default=0.2, ge=0.0, le=2.0, description="from what is seen to what the base does")
 
 
-class GlanceSettings(Settings):
-    """Beyond the paper: looking round."""
-
-    enabled: bool = Field(default=False, description="whether it looks round at all")
-    every_s: float = Field(default=8.0, gt=0.0, le=600.0, description="a direction out of view for longer is looked into,")
-    before_s: float = Field(
-        default=2.5, gt=0.0, le=600.0, description="and before somebody's line is entered, for longer than this,"
-    )
-    rest_s: float = Field(default=4.0, ge=0.0, le=600.0, description="at least so long after it has looked round,")
-    open_m: float = Field(default=2.0, gt=0.5, le=10.0, description="if nothing stands so near in it")
-
-
-class PasserSettings(Settings):
-    """Beyond the paper: who walks up and down the way (needs tracks)."""
-
-    remember_s: float = Field(default=90.0, ge=0.0, le=3600.0, description="how long the line that somebody walked is kept off")
-    least_m_s: float = Field(default=0.3, gt=0.0, le=3.0, description="tracks that move slower do not walk")
-    least_m: float = Field(default=1.5, gt=0.0, le=5.0, description="a way shorter than this tells no direction")
-    half_width_m: float = Field(default=0.25, gt=0.0, le=1.0, description="what he takes up to either side")
-    reach_m: float = Field(default=1.5, gt=0.0, le=5.0, description="lines farther than this from the centre line do not count")
-    middle: bool = Field(
-        default=False, description="where nobody was seen yet: whether people are expected in the middle of corridors"
-    )
-    widest_m: float = Field(default=3.0, gt=0.5, le=10.0, description="what is wider than this between its walls is no corridor,")
-    narrowest_m: float = Field(default=1.8, gt=0.0, le=10.0, description="and what is narrower has no room beside its middle")
-    expect_s: float = Field(default=8.0, ge=0.0, le=60.0, description="so long after he was seen he is taken to go on as he did,")
-    apart_m: float = Field(default=0.9, ge=0.0, le=5.0, description="and his line is not entered so near before or behind him")
-    onward_m: float = Field(default=3.0, ge=0.0, le=50.0, description="so far beyond where he was seen his line is stepped off")
-    goal_m: float = Field(default=1.0, ge=0.0, le=10.0, description="so near the goal the robot goes there all the same")
-
-
 class WaitingSettings(Settings):
     """While no way is free."""
 
@@ -218,5 +187,3 @@ class ClearanceManifoldSettings(Settings):
     smoothness: SmoothnessSettings = SmoothnessSettings()
     lookout: LookoutSettings = LookoutSettings()
     waiting: WaitingSettings = WaitingSettings()
-    passers: PasserSettings = PasserSettings()
-    glance: GlanceSettings = GlanceSettings()

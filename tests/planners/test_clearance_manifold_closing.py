@@ -51,10 +51,7 @@ def test_what_was_taken_in_goes_on_from_a_snapshot():
 
 def sections_at(xs):
     return Sections(
-        np.stack((np.array(xs), np.zeros(len(xs))), axis=1),
-        np.tile([0.0, 1.0], (len(xs), 1)),
-        np.zeros((len(xs), 2)),
-        np.full((len(xs), 1, 2), np.nan),
+        np.stack((np.array(xs), np.zeros(len(xs))), axis=1), np.tile([0.0, 1.0], (len(xs), 1)), np.zeros((len(xs), 2))
     )
 
 

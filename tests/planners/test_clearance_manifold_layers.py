@@ -39,7 +39,7 @@ def ground_of(belief):
 def straight_sections(xs, half_width_m=1.0):
     n = len(xs)
     at = np.stack((np.array(xs), np.zeros(n)), axis=1)
-    return Sections(at, np.tile([0.0, 1.0], (n, 1)), np.tile([-half_width_m, half_width_m], (n, 1)), np.full((n, 1, 2), np.nan))
+    return Sections(at, np.tile([0.0, 1.0], (n, 1)), np.tile([-half_width_m, half_width_m], (n, 1)))
 
 
 @pytest.mark.parametrize(("left_m", "right_m"), [(0.8, 0.5), (0.4, 0.9), (0.6, 0.6)])
