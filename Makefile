@@ -29,7 +29,7 @@ picture: $(STAMP)  ## make the README's pictures (needs a Vulkan driver; a softw
 	$(BIN)/trundle run dynamic_bottleneck --seed 4 --set planner.name=dwa --log runs/trap.rrd --force || [ $$? -eq 1 ]
 	$(BIN)/trundle review runs/trap.rrd --at 346 --screenshot docs/trap.png
 	$(BIN)/trundle run dynamic_bottleneck --seed 4 --set planner.name=rcsp --log runs/waiting.rrd --force
-	$(BIN)/trundle review runs/waiting.rrd --at 112 --screenshot docs/waiting.png
+	$(BIN)/trundle review runs/waiting.rrd --at 140 --screenshot docs/waiting.png
 
 test: lint  ## what CI runs: format, lint, types, layers, tests
 	$(BIN)/python -m pytest -n 2
