@@ -5,6 +5,7 @@ Source: Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking an
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,8 +58,14 @@ def squared_distance(motion: Motion, position_m: F64, covariance_m2: F64) -> flo
     return float(offset @ np.linalg.solve(motion.covariance[:2, :2] + covariance_m2, offset))
 
 
-def squared_distances(motion: Motion, positions_m: F64, sigmas_m: F64) -> F64:
-    """Return the squared Mahalanobis distances, shape (n,), of measured positions, shape (n, 2), with sigmas, shape (n,)."""
-    offset = positions_m - motion.state[:2]
-    spread = motion.covariance[:2, :2] + sigmas_m[:, None, None] ** 2 * PLANE  # (n, 2, 2)
+def squared_distances(motions: Sequence[Motion], positions_m: F64, sigmas_m: F64) -> F64:
+    """Return the squared Mahalanobis distances, shape (n,), of n measured positions from n motions, one each.
+
+    Args:
+        motions: n of them; the same one may come again.
+        positions_m: shape (n, 2).
+        sigmas_m: of the positions, shape (n,).
+    """
+    offset = positions_m - np.array([motion.state[:2] for motion in motions])
+    spread = np.array([motion.covariance[:2, :2] for motion in motions]) + sigmas_m[:, None, None] ** 2 * PLANE  # (n, 2, 2)
     return np.asarray(np.einsum("ni,nij,nj->n", offset, np.linalg.inv(spread), offset))

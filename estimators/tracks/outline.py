@@ -21,8 +21,10 @@ SEEN_MIN = 2  # free looks beside a side, of 15
 
 
 class Outline(NamedTuple):
-    """Bearings [rad] in odom and ranges [m] from the sensor."""
+    """Where in odom [m] the sensor stood, bearings [rad] in odom and ranges [m] from there."""
 
+    sensor_x: float
+    sensor_y: float
     right_rad: float
     left_rad: float  # at least right_rad
     nearest_m: float
@@ -63,7 +65,7 @@ def outline_of(points: F64, sensor_x: float, sensor_y: float, label: U8, x_m: fl
     corner_x, corner_y = (sensor_x - x_m) / cell_m, (sensor_y - y_m) / cell_m
     right = _sees_past(label, corner_x, corner_y, middle + low, low_m / cell_m, -1.0)
     left = _sees_past(label, corner_x, corner_y, middle + high, high_m / cell_m, 1.0)
-    return Outline(middle + low, middle + high, nearest, right, left)
+    return Outline(sensor_x, sensor_y, middle + low, middle + high, nearest, right, left)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -99,13 +101,13 @@ def bearing_of(seen: Outline, radius: float) -> float:
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def centre_of(points: F64, sensor_x: float, sensor_y: float, seen: Outline, radius: float) -> tuple[float, float]:
+def centre_of(points: F64, seen: Outline, radius: float) -> tuple[float, float]:
     """Return the centre of a disc of known radius [m] whose edge the points, shape (n, 2), lie on, and which its own sides touch.
 
     By Gauss-Newton, from a guess behind the points.
     """
     bearing, far = bearing_of(seen, radius), seen.nearest_m + radius
-    guess_x, guess_y = sensor_x + far * math.cos(bearing), sensor_y + far * math.sin(bearing)
+    guess_x, guess_y = seen.sensor_x + far * math.cos(bearing), seen.sensor_y + far * math.sin(bearing)
     x, y = guess_x, guess_y
     for _ in range(ITERATIONS):
         xx, xy, yy = ANCHOR, 0.0, ANCHOR
@@ -122,7 +124,7 @@ def centre_of(points: F64, sensor_x: float, sensor_y: float, seen: Outline, radi
             angle = seen.left_rad if side else seen.right_rad
             inwards = -1.0 if side else 1.0
             nx, ny = -inwards * math.sin(angle), inwards * math.cos(angle)
-            lack = TANGENT * (radius - nx * (x - sensor_x) - ny * (y - sensor_y))
+            lack = TANGENT * (radius - nx * (x - seen.sensor_x) - ny * (y - seen.sensor_y))
             xx, xy, yy = xx + TANGENT * nx * nx, xy + TANGENT * nx * ny, yy + TANGENT * ny * ny
             gx, gy = gx + nx * lack, gy + ny * lack
         determinant = xx * yy - xy * xy

@@ -47,7 +47,7 @@ def warm_up() -> None:
     Traces().moving(nothing, np.zeros((8, 8), dtype=np.int32), np.zeros(1), 0)
     outline = outline_of(np.ones((1, 2)), 0.0, 0.0, nothing.label, 0.0, 0.0, 1.0)
     bearing_of(outline, 1.0)
-    centre_of(np.ones((1, 2)), 0.0, 0.0, outline, 1.0)
+    centre_of(np.ones((1, 2)), outline, 1.0)
 
 
 def sensor_of(lattice: Lattice) -> tuple[float, float]:
@@ -138,6 +138,6 @@ def _cut(points: F64, part: NDArray[Any], expected: list[Disc]) -> NDArray[Any]:
     return cut
 
 
-def centred(segment: Segment, radius_m: float, lattice: Lattice) -> F64:
+def centred(segment: Segment, radius_m: float) -> F64:
     """Return the centre in odom, shape (2,), of the disc of known radius that shows this surface to the sensor."""
-    return np.array(centre_of(segment.points, *sensor_of(lattice), segment.outline, radius_m))
+    return np.array(centre_of(segment.points, segment.outline, radius_m))

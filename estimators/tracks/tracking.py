@@ -18,7 +18,7 @@ from scipy.optimize import linear_sum_assignment
 
 from drivers.interface.samples import frozen_array
 from drivers.interface.stateful import pack, unpack
-from estimators.belief import F64, FREE, Lattice, OccupancyGrid, Track
+from estimators.belief import F64, FREE, OccupancyGrid, Track
 from estimators.grid.labelling import FrameLabels
 from estimators.memory.remembered import Remembered
 from estimators.tracks import segmentation
@@ -64,54 +64,51 @@ class GridTracker:
 
     def update(self, frame: FrameLabels, remembered: Remembered, stamp_ns: int) -> None:
         """Take in a frame captured at `stamp_ns`, and what the memory knows with it."""
-        settings, lattice = self._settings, frame.grid.lattice
+        settings = self._settings
         carry = ConstantVelocity((stamp_ns - self._stamp_ns) / SECOND_NS, settings.acceleration_m_s2)
         self._stamp_ns = stamp_ns
         tracks = [replace(one, motion=carry.carry(one.motion)) for one in self._tracks if self._recent(one, stamp_ns)]
         surfaces = surfaces_of(frame, remembered, self._traces, stamp_ns, settings.clear_cells)
         found = segments(surfaces, [track.disc for track in tracks], settings.cells_min, settings.radius_max_m)
-        pairs = self._assign(tracks, found, lattice)
-        tracks = [self._seen(track, found[pairs[i]], lattice) if i in pairs else track for i, track in enumerate(tracks)]
+        pairs = self._assign(tracks, found)
+        tracks = [self._seen(track, found[pairs[i]]) if i in pairs else track for i, track in enumerate(tracks)]
         taken = set(pairs.values())
         born = [segment for index, segment in enumerate(found) if index not in taken and segment.loose]
         self._tracks = [track for track in tracks if self._lives(track, frame.grid)]
         for segment in born:
-            self._give_birth(segment, lattice)
+            self._give_birth(segment)
 
-    def _assign(self, tracks: list[Followed], found: list[Segment], lattice: Lattice) -> dict[int, int]:
+    def _assign(self, tracks: list[Followed], found: list[Segment]) -> dict[int, int]:
         """Return which segment each track gets, by their places in the lists."""
-        if not (tracks and found):
+        around = [(t, track.disc, self._reach_m(track)) for t, track in enumerate(tracks)]
+        close = [(t, s) for t, disc, reach_m in around for s, one in enumerate(found) if _apart_m(disc, one.disc) < reach_m]
+        if not close:
             return {}
-        cost = np.array([self._distances(track, found, lattice) for track in tracks])
-        cost = np.where(cost <= self._settings.gate, cost, BEYOND)
+        centres = np.array([centred(found[s], tracks[t].radius_m) for t, s in close])
+        sigmas_m = np.array([self._sigma_m(tracks[t], found[s]) for t, s in close])
+        distances = squared_distances([tracks[t].motion for t, _ in close], centres, sigmas_m)
+        cost = np.full((len(tracks), len(found)), BEYOND)
+        cost[tuple(np.transpose(close))] = np.where(distances <= self._settings.gate, distances, BEYOND)
         return {int(t): int(s) for t, s in zip(*linear_sum_assignment(cost), strict=True) if cost[t, s] < BEYOND}
 
-    def _distances(self, track: Followed, found: list[Segment], lattice: Lattice) -> F64:
-        """Return the squared distances, shape (segments,), of a track; `BEYOND` for what is out of any question."""
-        at, spread = track.disc, track.motion.covariance
+    def _reach_m(self, track: Followed) -> float:
+        """Return how far from a track's centre a segment's is at most, if it may be the track's."""
+        spread = track.motion.covariance
         doubt_m = math.sqrt(spread[0, 0] + spread[1, 1]) + self._settings.sigma_m + track.radius_m
-        reach_m = math.sqrt(self._settings.gate) * doubt_m + track.radius_m
-        near = [math.hypot(one.disc.x_m - at.x_m, one.disc.y_m - at.y_m) < reach_m for one in found]
-        close = [segment for segment, is_near in zip(found, near, strict=True) if is_near]
-        distances = np.full(len(found), BEYOND)
-        if close:
-            centres = np.array([centred(segment, track.radius_m, lattice) for segment in close])
-            sigmas_m = np.array([self._sigma_m(track, segment) for segment in close])
-            distances[near] = squared_distances(track.motion, centres, sigmas_m)
-        return distances
+        return math.sqrt(self._settings.gate) * doubt_m + track.radius_m
 
     def _sigma_m(self, track: Followed, segment: Segment) -> float:
         """Return how far off a centre may be: what shows neither of its sides may reach to either beyond what is seen."""
         return self._settings.sigma_m + _slack_m(segment, track.radius_m)
 
-    def _seen(self, track: Followed, segment: Segment, lattice: Lattice) -> Followed:
+    def _seen(self, track: Followed, segment: Segment) -> Followed:
         settings, wider_m = self._settings, segment.disc.radius_m - track.radius_m
         narrower = 0.1 * settings.radius_gain if segment.outline.whole else 0.0
         gain = settings.radius_gain if wider_m > 0.0 else narrower
         radius_m = max(track.radius_m + gain * wider_m, settings.radius_min_m)
-        covariance, centre = self._sigma_m(track, segment) ** 2 * PLANE, centred(segment, track.radius_m, lattice)
+        covariance, centre = self._sigma_m(track, segment) ** 2 * PLANE, centred(segment, track.radius_m)
         moved = corrected(track.motion, centre, covariance)
-        motion = shifted(moved, centred(segment, radius_m, lattice) - centre)  # a disc that grows has not moved
+        motion = shifted(moved, centred(segment, radius_m) - centre)  # a disc that grows has not moved
         seen_ns = self._stamp_ns if segment.loose else track.seen_ns  # or a track that met a wall's end would follow it
         return Followed(track.identity, motion, radius_m, track.hits + 1, seen_ns)
 
@@ -121,12 +118,12 @@ class GridTracker:
         gone = (inside and seen.label[row, column] == FREE) or track.hits < self._settings.hits_min
         return not gone or self._stamp_ns - track.seen_ns <= self._settings.vanish_s * SECOND_NS
 
-    def _give_birth(self, segment: Segment, lattice: Lattice) -> None:
+    def _give_birth(self, segment: Segment) -> None:
         """Begin a track, unless the segment is a piece of one that is there; what is hidden in part is as wide as is usual."""
         settings = self._settings
         least_m = settings.radius_min_m if segment.outline.whole else settings.radius_usual_m
         radius_m = max(segment.disc.radius_m, least_m)
-        x, y = centred(segment, radius_m, lattice)
+        x, y = centred(segment, radius_m)
         if any((x - one.disc.x_m) ** 2 + (y - one.disc.y_m) ** 2 < one.radius_m**2 for one in self._tracks):
             return
         sigma_m = settings.sigma_m + _slack_m(segment, radius_m)
@@ -174,6 +171,10 @@ class GridTracker:
         ]
         self._traces.restore(state["traces"].tobytes())
         self._next_identity, self._stamp_ns = int(state["next_identity"]), int(state["stamp_ns"])
+
+
+def _apart_m(one: Disc, other: Disc) -> float:
+    return math.hypot(one.x_m - other.x_m, one.y_m - other.y_m)
 
 
 def _slack_m(segment: Segment, radius_m: float) -> float:

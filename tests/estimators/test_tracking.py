@@ -220,7 +220,7 @@ def loose(cells, hidden=False):
 def test_a_disc_seen_from_one_side_is_found_with_its_radius(x, y, radius):
     (segment,) = segments(loose(surface(x, y, radius)), [], 3, 0.6)
     assert segment.disc.radius_m == pytest.approx(radius, abs=0.05)
-    assert np.hypot(*(centred(segment, radius, LATTICE) - [x, y])) < 0.04
+    assert np.hypot(*(centred(segment, radius) - [x, y])) < 0.04
 
 
 @pytest.mark.parametrize("shown_m", [0.1, 0.2, 0.3, 0.4, 0.5])
@@ -230,7 +230,7 @@ def test_however_much_of_it_is_hidden_a_disc_of_known_radius_is_where_its_own_si
     hidden[math.floor((shown_m - 0.3 + 2.525) / CELL_M) :] = True
     (segment,) = segments(loose(cells & ~hidden, hidden), [], 2, 0.6)
     assert (segment.outline.right_own, segment.outline.left_own) == (True, False)
-    assert abs(centred(segment, 0.3, LATTICE)[1]) < 0.06
+    assert abs(centred(segment, 0.3)[1]) < 0.06
     (seen_past,) = segments(loose(cells), [], 3, 0.6)
     assert (seen_past.outline.right_own, seen_past.outline.left_own) == (True, True)
 
@@ -298,5 +298,5 @@ def test_constant_velocity_in_closed_form():
     gain = prior[:, 0] / (prior[0, 0] + 0.01)
     np.testing.assert_allclose(measured.state[[0, 2]], [1.05, 0.5] + gain * 0.1)
     np.testing.assert_allclose(measured.covariance[0, 0], prior[0, 0] * (1.0 - gain[0]))
-    off = squared_distances(carried, np.array([[1.15, 1.95], [1.05, 2.25]]), np.array([0.1, 0.2]))
+    off = squared_distances([carried, carried], np.array([[1.15, 1.95], [1.05, 2.25]]), np.array([0.1, 0.2]))
     np.testing.assert_allclose(off, [0.01 / (prior[0, 0] + 0.01), 0.09 / (prior[0, 0] + 0.04)])
