@@ -31,7 +31,7 @@ class Oncoming:
     """One front: the nearest."""
 
     def __init__(self, carry_s: float) -> None:
-        """Take for how long it is carried on; 0: not at all."""
+        """Take for how long it is carried on."""
         self._carry_s = carry_s
         self._forget()
 
@@ -47,15 +47,12 @@ class Oncoming:
             robot: in odom, shape (2,).
             now_s: when.
         """
-        nobody = np.zeros((0, 2))
-        if self._carry_s <= 0.0:
-            return nobody
         away = np.hypot(*(cells - robot).T)
         if away.size and away.min() < NEAR_M:
             his = cells[np.hypot(*(cells - cells[int(np.argmin(away))]).T) < BODY_M]
             if len(his) >= max(CELLS, WHOLE * len(self._front)):
                 self._look(his, now_s)
-                return nobody
+                return np.zeros((0, 2))
         return self._carried(robot, now_s)
 
     def _look(self, front: F64, now_s: float) -> None:
