@@ -12,6 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from estimators.belief import FREE, OCCUPIED, U8, UNKNOWN
+from estimators.grid.first_surfaces import first_surfaces, may_meet
 
 Occupied = NDArray[Any]  # (rows, columns) uint8, 1 or 0
 Counts = NDArray[Any]  # (rows, columns) int32
@@ -93,10 +94,12 @@ def label_cells(occupied: Occupied, hits: Counts, free_ends: U8, row0: int, colu
         for column in range(label.shape[1]):
             if hits[row, column] > 0 or free_ends[row, column]:
                 _trace_free(occupied, label, row0, column0, row, column, free_ends[row, column] != 0)
-    touches = touching(occupied)
+    touches, first = touching(occupied), first_surfaces(occupied, row0, column0)
     for row in range(label.shape[0]):
         for column in range(label.shape[1]):
             if occupied[row, column]:
                 label[row, column] = OCCUPIED
-            if label[row, column] != UNKNOWN and is_hidden(occupied, touches, row0, column0, row, column):
+            if label[row, column] == UNKNOWN or not may_meet(first, row - row0, column - column0):
+                continue
+            if is_hidden(occupied, touches, row0, column0, row, column):
                 label[row, column] = UNKNOWN
