@@ -128,7 +128,10 @@ class _Run:
         pacer.measured_plan_ns = self._stopwatch.plan_ns
         recorded = recording(self._recorder, self._key_frames(), assembly.parts.board, unwritable)
         stages = assembly.parts.stages(assembly.robot.read, assembly.robot.write, recorded)
-        with realtime(assembly.configuration.loop.system) as self._refused:
+        system = assembly.configuration.loop.system
+        if assembly.lockstep:  # a tick that waits for the collector loses no time
+            system = system.model_copy(update={"freeze_garbage": False})
+        with realtime(system) as self._refused:
             self._options.ready(assembly)
             start_s = time.perf_counter()
             try:

@@ -46,7 +46,7 @@ class RealtimeSection(Settings):
     priority: int | None = Field(default=None, ge=1, le=98, description="SCHED_FIFO priority; none: leave the scheduler alone")
     lock_memory: bool = Field(default=False, description="mlockall: no page of ours is swapped out")
     cpus: tuple[int, ...] = Field(default=(), description="CPU affinity; empty: leave it")
-    freeze_garbage: bool = Field(default=True, description="collect once, then keep the collector out of the loop")
+    freeze_garbage: bool = Field(default=True, description="in real time: collect once, then keep the collector out of the loop")
 
 
 class LoopSection(Settings):

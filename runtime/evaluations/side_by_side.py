@@ -52,7 +52,7 @@ def _each(todo: tuple[C, ...], work: Callable[[C], R], jobs: int) -> Iterator[tu
         yield from ((case, work(case)) for case in todo)
         return
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # one core a process: more threads would only push each other aside
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_on_one_core) as pool:
         futures = {pool.submit(work, case): case for case in todo}
         try:
             for future in as_completed(futures):
@@ -60,3 +60,10 @@ def _each(todo: tuple[C, ...], work: Callable[[C], R], jobs: int) -> Iterator[tu
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
+
+
+def _on_one_core() -> None:
+    """Keep OpenCV, which no variable of the environment tells, to the worker's own core as well."""
+    import cv2  # noqa: PLC0415 - in the worker process, not in the one that hands out the work
+
+    cv2.setNumThreads(1)
