@@ -7,22 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimators.belief import F64
+from planners.clearance_manifold.branch_kernels import across, cheapest_branch, cost_along, encounters, station_costs
 from planners.clearance_manifold.manifold import Manifold, Stations, points_of
 from planners.clearance_manifold.offset_qp import FAR_M, OffsetProgram
 from planners.clearance_manifold.ridge_kernels import (
     Demand,
     Ground,
     Sections,
-    across,
     along_manifold,
     ample_boxes,
     boxes,
-    cheapest_branch,
-    cost_along,
-    encounters,
     profiles,
     repair_all,
-    station_costs,
 )
 from planners.clearance_manifold.settings import SolverSettings, TrackerSettings
 from planners.planner import PlannerSetup

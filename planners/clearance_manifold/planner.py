@@ -17,6 +17,7 @@ from drivers.interface.geometry import SE2
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import F64, Belief
 from estimators.field_query import sample
+from planners.clearance_manifold.branch_kernels import side_of
 from planners.clearance_manifold.chart import Chart, lay_chart
 from planners.clearance_manifold.control_kernels import brakable
 from planners.clearance_manifold.controller import ManifoldController, Situation
@@ -30,7 +31,7 @@ from planners.clearance_manifold.manifold import Stations
 from planners.clearance_manifold.prediction import ArrivalField, Predicted
 from planners.clearance_manifold.properties import check
 from planners.clearance_manifold.reading import Reader
-from planners.clearance_manifold.ridge_kernels import Ground, Sections, side_of
+from planners.clearance_manifold.ridge_kernels import Ground, Sections
 from planners.clearance_manifold.settings import ClearanceManifoldSettings
 from planners.clearance_manifold.tracker import Category, Continuation, Tracker
 from planners.clearance_manifold.waiting import Waiting

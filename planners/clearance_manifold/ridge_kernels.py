@@ -1,4 +1,4 @@
-"""Cross-sections of the predicted field: the ridge, the box around it, and the branch that is followed."""
+"""Cross-sections of the predicted field: the ridge, the box around it, and its repair from tick to tick."""
 
 from __future__ import annotations
 
@@ -11,15 +11,6 @@ from estimators.belief import F32, F64
 from estimators.field_query import bilinear
 
 _FINE = 5  # samples of a tube, to either side
-BODY_M = 0.25  # from the middle of a boundary that closes in to its sides
-NARROW = 5.0  # cost of a station where the shield would stop; less, the nearer it is to ample
-EARLY = 0.7  # of the time to a place: the robot may be there so early
-STEEP = 2.0  # no branch is steeper: from one station to the next it would lead through what stands between them
-COMMITTED_M = 0.1  # so far from the line of who comes the robot has begun to let him pass,
-FAR_M = 0.7  # and so far from it he is nobody's
-ALONG = 0.3  # the share of a velocity that leads across the way of who comes along it, at most
-CROSS, BEGIN = 3.0, 20.0  # cost of a station on the other side of that line, and of the robot's own: it is not there
-AWAY = 4.0  # cost of a squared distance between the robot and its own station, per square metre
 
 
 class Sections(NamedTuple):
@@ -132,162 +123,6 @@ def profiles(ground: Ground, sections: Sections, offsets: F64) -> F64:
             if sections.reach[i, 0] <= y <= sections.reach[i, 1]:
                 rho[i, j] = clearance_at(ground, sections, i, y)
     return rho
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def encounters(sections: Sections, offsets: F64, robot: F64, speed_m_s: float, horizon_s: float, closing: F64) -> F64:
-    """Return how near what closes in comes to every station and offset once the robot can be there, shape (n, m) [m].
-
-    The robot may be later than it hopes, as it yields; so all that comes there after its earliest arrival counts: a branch that
-    crosses before somebody is bad for as long as he is on his way, one that crosses behind him is free once he is past.
-
-    Args:
-        sections: from the robot's own on.
-        offsets: shape (m,).
-        robot: in odom, shape (2,).
-        speed_m_s: the fastest that the robot arrives with.
-        horizon_s: how far it is extrapolated.
-        closing: middle, velocity and number of cells of the boundary, shape (5,).
-    """
-    apart = np.full((len(sections.at), len(offsets)), np.inf)
-    if closing[4] == 0.0:
-        return apart
-    speed2 = max(closing[2] * closing[2] + closing[3] * closing[3], 1e-6)
-    for i in range(len(sections.at)):
-        for j in range(len(offsets)):
-            x = sections.at[i, 0] + offsets[j] * sections.normal[i, 0]
-            y = sections.at[i, 1] + offsets[j] * sections.normal[i, 1]
-            first = min(EARLY * np.hypot(x - robot[0], y - robot[1]) / speed_m_s, horizon_s)
-            nearest = ((x - closing[0]) * closing[2] + (y - closing[1]) * closing[3]) / speed2
-            t = min(max(nearest, first), horizon_s)
-            apart[i, j] = np.hypot(x - closing[0] - closing[2] * t, y - closing[1] - closing[3] * t) - BODY_M
-    return apart
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def side_of(robot: F64, normal: F64, horizon_s: float, closing: F64) -> float:
-    """Return how far to his left the robot is off the line of who comes along the way [m], NaN where nobody comes near it.
-
-    Args:
-        robot: in odom, shape (2,).
-        normal: of the way where the robot is, to its left, unit, shape (2,).
-        horizon_s: who comes later does not count.
-        closing: middle, velocity and number of cells of the boundary, shape (5,).
-    """
-    speed2 = closing[2] * closing[2] + closing[3] * closing[3]
-    if closing[4] == 0.0 or speed2 < 0.01:
-        return float(np.nan)
-    x, y, speed = robot[0] - closing[0], robot[1] - closing[1], np.sqrt(speed2)
-    side, time_s = float((y * closing[2] - x * closing[3]) / speed), (x * closing[2] + y * closing[3]) / speed2
-    along = abs(closing[2] * normal[0] + closing[3] * normal[1]) <= ALONG * speed
-    return side if along and abs(side) < FAR_M and 0.0 < time_s < horizon_s else float(np.nan)
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def across(sections: Sections, offsets: F64, robot: F64, speed_m_s: float, horizon_s: float, closing: F64) -> F64:
-    """Return what it costs to change the side of who comes along the way, shape (n, m), where he still comes by.
-
-    Two lanes beside somebody are often as good as each other, and the noise of a clearance would send the robot from one to the
-    other in front of him.  So as soon as it has begun to go to one hand, the other one must be better by that.
-
-    Args:
-        sections: from the robot's own on.
-        offsets: shape (m,).
-        robot: in odom, shape (2,).
-        speed_m_s: the fastest that the robot arrives with.
-        horizon_s: who comes later does not count.
-        closing: middle, velocity and number of cells of the boundary, shape (5,).
-    """
-    cost = np.zeros((len(sections.at), len(offsets)))
-    side = side_of(robot, sections.normal[0], horizon_s, closing)
-    if not abs(side) > COMMITTED_M:  # nobody comes, or it has not begun
-        return cost
-    speed2 = closing[2] * closing[2] + closing[3] * closing[3]
-    left_x, left_y = -closing[3] / np.sqrt(speed2), closing[2] / np.sqrt(speed2)
-    for i in range(len(sections.at)):
-        for j in range(len(offsets)):
-            x = sections.at[i, 0] + offsets[j] * sections.normal[i, 0]
-            y = sections.at[i, 1] + offsets[j] * sections.normal[i, 1]
-            first = EARLY * np.hypot(x - robot[0], y - robot[1]) / speed_m_s if i > 0 else 0.0
-            passes = ((x - closing[0]) * closing[2] + (y - closing[1]) * closing[3]) / speed2
-            if passes > first and side * ((x - closing[0]) * left_x + (y - closing[1]) * left_y) < 0.0:
-                cost[i, j] = CROSS if i > 0 else BEGIN
-    return cost
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def station_costs(rho: F64, apart: F64, offsets: F64, demand: Demand) -> F64:
-    """Return what it costs to pass each station at each offset, shape (n, m), in metres of clearance missed.
-
-    Args:
-        rho: predicted clearances, shape (n, m).
-        apart: distances to what closes in, on arrival, shape (n, m).
-        offsets: shape (m,).
-        demand: what a station must have.
-    """
-    cost = np.empty(rho.shape)
-    for i in range(rho.shape[0]):
-        for j in range(rho.shape[1]):
-            short = max(0.0, demand.kept_m - rho[i, j])
-            room = min(rho[i, j], apart[i, j])
-            narrow = min(max(0.0, demand.ample_m - room) / (demand.ample_m - demand.kept_m), 1.0)
-            cost[i, j] = -worth(room, offsets[j], demand) + 20.0 * short + NARROW * narrow
-    return cost
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def cheapest_branch(costs: F64, offsets: F64, spacing_m: F64, start: float, turn: float) -> tuple[F64, float]:
-    """Return the branch that costs least, shape (n,) [m], and what it costs.
-
-    A station's best offset taken alone would hop between the two sides of an obstacle from one station to the next; so the
-    branch is chosen as a whole, by dynamic programming over stations and offsets, no steeper than `STEEP`.
-
-    Args:
-        costs: of every station and offset, shape (n, m).
-        offsets: evenly spaced, shape (m,), m > 1.
-        spacing_m: between stations, shape (n - 1,).
-        start: offset of the robot at the first station.
-        turn: cost of a squared slope, per metre.
-    """
-    n, m = costs.shape
-    total, came = np.empty((n, m)), np.zeros((n, m), np.int64)
-    apart_m = (offsets[m - 1] - offsets[0]) / (m - 1)
-    for j in range(m):
-        total[0, j] = costs[0, j] + AWAY * (offsets[j] - start) ** 2
-    for i in range(1, n):
-        most = max(1, int(STEEP * spacing_m[i - 1] / apart_m))
-        for j in range(m):
-            best, before = np.inf, 0
-            for k in range(max(0, j - most), min(m, j + most + 1)):
-                step = offsets[j] - offsets[k]
-                value = total[i - 1, k] + turn * step * step / spacing_m[i - 1]
-                if value < best:
-                    best, before = value, k
-            total[i, j], came[i, j] = best + costs[i, j], before
-    y = np.empty(n)
-    j = int(np.argmin(total[n - 1]))
-    least = total[n - 1, j]
-    for back in range(n):
-        y[n - 1 - back] = offsets[j]
-        j = came[n - 1 - back, j]
-    return y, least
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def cost_along(costs: F64, offsets: F64, spacing_m: F64, start: float, turn: float, y: F64) -> float:
-    """Return what a branch, shape (n,), costs, as `cheapest_branch` counts."""
-    n, m = costs.shape
-    total, before = 0.0, 0
-    for i in range(n):
-        j = int(min(max(np.rint((y[i] - offsets[0]) / (offsets[1] - offsets[0])), 0.0), m - 1.0))
-        total += costs[i, j]
-        if i == 0:
-            total += AWAY * (offsets[j] - start) ** 2
-        else:
-            step = offsets[j] - offsets[before]
-            total += turn * step * step / spacing_m[i - 1]
-        before = j
-    return total
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -5,9 +5,10 @@ import pytest
 
 from drivers.interface.geometry import SE2
 from estimators.belief import ClearanceField, Lattice
+from planners.clearance_manifold.branch_kernels import BEGIN, BODY_M, CROSS, FAR_M, across, encounters, side_of
 from planners.clearance_manifold.control_kernels import give_way, known_way
 from planners.clearance_manifold.recent_rate import WINDOW_S, RecentRate
-from planners.clearance_manifold.ridge_kernels import BEGIN, BODY_M, CROSS, FAR_M, Sections, across, encounters, side_of
+from planners.clearance_manifold.ridge_kernels import Sections
 
 OFFSETS = np.linspace(-1.0, 1.0, 5)
 CELL_M = 0.05

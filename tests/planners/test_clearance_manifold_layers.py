@@ -8,23 +8,14 @@ from drivers.interface.commands import BodyTwist
 from drivers.interface.geometry import SE2
 from estimators.clearance import distance_to
 from estimators.field_query import sample
+from planners.clearance_manifold.branch_kernels import NARROW, STEEP, cheapest_branch, station_costs
 from planners.clearance_manifold.chart import STEP_M, lay_chart
 from planners.clearance_manifold.control_kernels import brakable, known_length
 from planners.clearance_manifold.distance_kernels import lowered
 from planners.clearance_manifold.manifold import Stations
 from planners.clearance_manifold.offset_qp import OffsetProgram
 from planners.clearance_manifold.prediction import ArrivalField
-from planners.clearance_manifold.ridge_kernels import (
-    NARROW,
-    STEEP,
-    Demand,
-    Ground,
-    Sections,
-    ample_boxes,
-    boxes,
-    cheapest_branch,
-    station_costs,
-)
+from planners.clearance_manifold.ridge_kernels import Demand, Ground, Sections, ample_boxes, boxes
 from planners.clearance_manifold.settings import ChartSettings, PredictionSettings, SolverSettings
 from tests.planners.synthetic import Box, Disc, belief_of
 
