@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from drivers.interface.samples import frozen_array
 from estimators.belief import F32, F64, OCCUPIED, Belief, Lattice, Mask, Track
-from estimators.clearance import distance_to
 from estimators.field_query import sample
 from planners.risk import extremes
 
@@ -45,10 +44,19 @@ def static_cells(belief: Belief, margin_m: float) -> Mask | None:
     return cells
 
 
-def static_clearance(belief: Belief, margin_m: float) -> F32:
-    """Return the distance from each cell to the nearest of the `static_cells`, shape (rows, columns) [m]."""
-    cells = static_cells(belief, margin_m)
-    return belief.clearance.clearance_m if cells is None else distance_to(cells, belief.grid.lattice.cell_m)
+def static_clearance(belief: Belief, margin_m: float, far_m: float) -> F32:
+    """Return the distance from each cell to the nearest of the `static_cells`, shape (rows, columns) [m], exact up to `far_m`.
+
+    What is farther away may be so by any amount.
+    """
+    cells, cell_m = static_cells(belief, margin_m), belief.grid.lattice.cell_m
+    return belief.clearance.clearance_m if cells is None else _near(cells, far_m, cell_m)
+
+
+def _near(occupied: Mask, far_m: float, cell_m: float) -> F32:
+    """Return the distance from each cell to the nearest occupied one, shape (rows, columns) [m], exact up to `far_m`."""
+    distance_m: F32 = near_distance(occupied, math.ceil(far_m / cell_m) + 2, cell_m)
+    return distance_m
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +84,7 @@ def surroundings(belief: Belief, margin_m: float, reach_m: float, far_m: float) 
     if not discs.size:
         return Surroundings(lattice, belief.clearance.clearance_m[top:bottom, left:right].copy(), label)
     occupied: Mask = _without(label, discs, lattice.x_m, lattice.y_m, cell_m)
-    return Surroundings(lattice, near_distance(occupied, math.ceil(far_m / cell_m) + 2, cell_m), label)
+    return Surroundings(lattice, _near(occupied, far_m, cell_m), label)
 
 
 def _span(centre: float, half: int, count: int) -> tuple[int, int]:
@@ -124,8 +132,8 @@ def _without(label: NDArray[np.uint8], discs: F64, x_m: float, y_m: float, cell_
 def near_distance(occupied: Mask, most: int, cell_m: float) -> F32:
     """Return the distance [m] from each cell's centre to that of the nearest occupied one, `most` cells at most.
 
-    Exact, and the same as `distance_to` up to there: distances along the columns, then along each row the least of their
-    squares plus the squares of the steps to them.
+    Exact, and the same as `estimators.clearance.distance_to` up to there: distances along the columns, then along each row the
+    least of their squares plus the squares of the steps to them.
 
     Source: Saito, Toriwaki, New algorithms for Euclidean distance transformation of an n-dimensional digitized picture with
     applications, Pattern Recognition 27(11), 1994; with a bounded search.

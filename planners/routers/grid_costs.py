@@ -58,7 +58,9 @@ def cost_grid(belief: Belief, settings: GridCosts, robot_radius_m: float) -> Cos
     rows, columns = (fine.rows - top) // factor, (fine.columns - left) // factor
     cell_m = factor * fine.cell_m
     lattice = Lattice(fine.x_m + left * fine.cell_m, fine.y_m + top * fine.cell_m, cell_m, rows, columns)
-    clearance_m = static_clearance(belief, _OWN_M) if settings.through_movers else belief.clearance.clearance_m
+    dear_m = robot_radius_m + settings.margin_m + settings.comfort_m  # farther off, nearness costs nothing
+    far_m = dear_m + 2.0 * cell_m  # so that no block which is dear in part has a cell that is farther away
+    clearance_m = static_clearance(belief, _OWN_M, far_m) if settings.through_movers else belief.clearance.clearance_m
     gap_m = _blocks(clearance_m, top, left, rows, columns, factor) - robot_radius_m - settings.margin_m
     unknown = _blocks(belief.grid.label == UNKNOWN, top, left, rows, columns, factor) > 0.5
 

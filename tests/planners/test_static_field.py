@@ -7,8 +7,9 @@ import pytest
 
 from drivers.interface.geometry import SE2
 from drivers.interface.samples import frozen_array
-from estimators.belief import Track
+from estimators.belief import OCCUPIED, Track
 from estimators.clearance import distance_to
+from planners.routers.grid_costs import GridCosts, cost_grid
 from planners.static_field import near_distance, static_clearance, surroundings
 from tests.planners.synthetic import Box, Disc, belief_of
 
@@ -32,7 +33,7 @@ def test_the_surroundings_are_a_window_of_the_whole(pose, tracked):
     belief = belief_of((Box(-0.9, -0.5, -0.7, 0.5), Box(2.0, -2.8, 2.2, -2.0), walking), SE2())
     track = Track(0, (walking.x, walking.y), (0.5, 0.0), walking.radius, frozen_array(np.zeros((4, 4))))
     belief = replace(belief, odom_from_base=pose, tracks=(track,) if tracked else ())
-    near, whole, lattice = surroundings(belief, 0.1, 0.8, 0.5), static_clearance(belief, 0.1), belief.grid.lattice
+    near, whole, lattice = surroundings(belief, 0.1, 0.8, 0.5), static_clearance(belief, 0.1, 9.0), belief.grid.lattice
     row, column = (round((a - b) / lattice.cell_m) for a, b in ((near.lattice.y_m, lattice.y_m), (near.lattice.x_m, lattice.x_m)))
     window = np.s_[row : row + near.lattice.rows, column : column + near.lattice.columns]
     assert np.array_equal(near.label, belief.grid.label[window])
@@ -40,3 +41,14 @@ def test_the_surroundings_are_a_window_of_the_whole(pose, tracked):
     reached = (np.hypot(x - pose.x, y - pose.y) <= 0.8).reshape(near.label.shape)
     assert reached.any() or pose.x > 10.0
     assert np.minimum(near.clearance_m, 0.5)[reached] == pytest.approx(np.minimum(whole[window], 0.5)[reached], abs=1e-7)
+
+
+def test_the_router_passes_what_is_tracked_as_if_it_were_not_there():
+    walls, walking = (Box(-0.9, -0.5, -0.7, 0.5), Box(2.0, -2.8, 2.2, -2.0)), Disc(0.8, 0.1, 0.25)
+    track = Track(0, (walking.x, walking.y), (0.5, 0.0), walking.radius, frozen_array(np.zeros((4, 4))))
+    passed, bare = replace(belief_of((*walls, walking), SE2()), tracks=(track,)), belief_of(walls, SE2())
+    whole = distance_to(bare.grid.label == OCCUPIED, bare.grid.lattice.cell_m)
+    bare = replace(bare, clearance=replace(bare.clearance, clearance_m=frozen_array(whole)))
+    costs = cost_grid(passed, GridCosts(through_movers=True), 0.2).cost
+    assert np.array_equal(costs, cost_grid(bare, GridCosts(), 0.2).cost)
+    assert not np.array_equal(costs, cost_grid(passed, GridCosts(), 0.2).cost)
