@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import mujoco
@@ -45,6 +46,7 @@ class SimTruth(SimSensor[TruthSample]):
         """
         super().__init__(setup, settings.rate_hz, capacity=settings.buffered_samples)
         self._clearance: RobotClearance | None = None
+        self._looked_s = 0.0  # when the newest look was, on the scene's own clock
         self._base_id = 0
         self._items: tuple[tuple[str, int, float], ...] = ()
 
@@ -61,25 +63,29 @@ class SimTruth(SimSensor[TruthSample]):
         self._clearance.measure(world.data)
 
     def latest(self) -> TruthSample | None:
-        """Return the truth now, or None before the first."""
+        """Return the truth now, or None before the first.
+
+        Where walkers were follows from the time alone, so they are looked up here, for the newest look only.
+        """
         looks = self.drain()
         if looks:
-            self._newest = merged_truth(looks)
+            newest = merged_truth(looks)
+            self._newest = replace(newest, obstacles=(*self._walkers(self._looked_s), *newest.obstacles))
         return self._newest if self._state is DeviceState.OPEN else None
 
     def _measure(self, world: MujocoWorld, stamp: Stamp) -> TruthSample:
         assert self._clearance is not None  # bound before the world acts
         _, _, wz, vx, vy, _ = _velocity(world, self._base_id, in_body=True)
         clearance_m, contacts = self._clearance.measure(world.data)
-        return TruthSample(stamp, _pose(world, self._base_id), BodyTwist(vx, vy, wz), self._moving(world), clearance_m, contacts)
+        items = tuple(_item(world, name, body, radius_m) for name, body, radius_m in self._items)
+        self._looked_s = world.scene_ns / SECOND_NS
+        return TruthSample(stamp, _pose(world, self._base_id), BodyTwist(vx, vy, wz), items, clearance_m, contacts)
 
-    def _moving(self, world: MujocoWorld) -> tuple[ObstacleTruth, ...]:
-        time_s = world.scene_ns / SECOND_NS
-        movers = [
-            ObstacleTruth(m.name, m.pose_at(time_s), m.velocity_at(time_s), m.shape.bounding_radius_m) for m in world.scene.movers
-        ]
-        items = [_item(world, name, body, radius_m) for name, body, radius_m in self._items]
-        return (*movers, *items)
+    def _walkers(self, time_s: float) -> tuple[ObstacleTruth, ...]:
+        return tuple(
+            ObstacleTruth(m.name, m.pose_at(time_s), m.velocity_at(time_s), m.shape.bounding_radius_m)
+            for m in self._world.scene.movers
+        )
 
     def _reset(self) -> None:
         super()._reset()
