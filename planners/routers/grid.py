@@ -46,7 +46,8 @@ class GridRouter:
         self._last = no_path()  # (n, 2) in odom
 
     def warm_up(self) -> None:
-        """Compile the path kernel."""
+        """Compile the kernels."""
+        GridGraph(2, 2, 1.0).search(np.ones((2, 2)), 0)
         pull_straight(np.zeros((2, 2)), np.ones((2, 2)))
         near_cells(np.zeros(1, np.int64), np.zeros(1, np.int64), 1, 2, 2)
         static_field.warm_up(frozen_array(np.zeros((2, 2), np.uint8)))

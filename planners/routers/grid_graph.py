@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
@@ -41,11 +42,16 @@ class GridGraph:
             cost: per cell, shape (rows, columns), positive; infinite where there is no way.
             start: node number.
         """
-        flat = cost.ravel()
-        weight = np.add(flat[self._tail], flat[self._head], out=self._graph.data)
-        weight *= self._half_length
+        weigh(cost.ravel(), self._tail, self._head, self._half_length, self._graph.data)
         distance, predecessor = dijkstra(self._graph, directed=True, indices=[start], return_predecessors=True)
         return distance[0], np.asarray(predecessor[0], dtype=np.int32)
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def weigh(cost: F64, tail: I32, head: I32, half_length: F64, weight: F64) -> None:
+    """Write the weight of every edge, shape (edges,), from the cost of every node, shape (nodes,)."""
+    for edge in range(len(weight)):
+        weight[edge] = (cost[tail[edge]] + cost[head[edge]]) * half_length[edge]
 
 
 def trace(predecessor: I32, target: int) -> list[int]:
