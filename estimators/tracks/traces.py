@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import F64, OCCUPIED, Lattice, Mask, OccupancyGrid
 from estimators.memory.rolling import transfer
+from estimators.tracks.components import sizes
 from estimators.tracks.tracking_kernels import count_left, keep_times
 
 NEVER_NS = -(2**62)
@@ -55,8 +56,8 @@ class Traces:
         keep_times(label, self._seen_ns, self._since_ns, stamp_ns, stamp_ns - SPAN_NS, NEVER_NS)
         seen = label == OCCUPIED
         young = seen & (self._since_ns >= stamp_ns - YOUNG_NS)
-        cells, young_cells = (np.bincount(component[some], minlength=len(left)) for some in (seen, young))
-        return np.asarray((left >= LEFT_MIN) & (young_cells > YOUNG_SHARE * cells) & (across_m <= self._widest_m))
+        came = sizes(component, young, len(left)) > YOUNG_SHARE * sizes(component, seen, len(left))
+        return np.asarray((left >= LEFT_MIN) & came & (across_m <= self._widest_m))
 
     def snapshot(self) -> bytes:
         """Return the whole state."""

@@ -1,0 +1,13 @@
+"""Components and their cells against NumPy's counting and indexing."""
+
+import numpy as np
+
+from estimators.tracks.components import cells_of, sizes
+
+
+def test_components_are_counted_and_chosen_as_numpy_does():
+    rng = np.random.default_rng(0)
+    component = rng.integers(0, 7, (23, 31)).astype(np.int32)
+    cells, chosen = rng.random(component.shape) < 0.3, rng.random(9) < 0.5  # the last two have no cell
+    assert np.array_equal(sizes(component, cells, 9), np.bincount(component[cells], minlength=9))
+    assert np.array_equal(cells_of(component, chosen), chosen[component])
