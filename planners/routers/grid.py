@@ -19,7 +19,7 @@ from planners.router import Route, RouterSetup, goal_yaw
 from planners.routers.grid_costs import CostGrid, GridCosts, cost_grid
 from planners.routers.grid_graph import GridGraph, trace
 from planners.routers.grid_kernels import near_cells, pull_straight
-from planners.routers.window import remainder_outside, ring
+from planners.routers.window import around, remainder_outside, ring
 
 F64 = NDArray[np.float64]
 
@@ -109,12 +109,7 @@ def _choose_target(lattice: Lattice, distance: F64, goal: F64, tolerance_m: floa
     """Return the node to go to and what remains from there [m]; the node's distance is infinite when there is none."""
     (row,), (column,) = lattice.cell_of(goal[None])
     if 0 <= row < lattice.rows and 0 <= column < lattice.columns:
-        x = lattice.x_m + (np.arange(lattice.columns) + 0.5) * lattice.cell_m - goal[0]
-        y = lattice.y_m + (np.arange(lattice.rows) + 0.5) * lattice.cell_m - goal[1]
-        remainder = np.hypot(*np.meshgrid(x, y)).ravel()
-        eligible = np.isfinite(distance) & (remainder <= tolerance_m)
-        target = int(np.argmin(np.where(eligible, remainder, np.inf)))
-        return target, float(remainder[target]) if eligible[target] else np.inf
+        return _nearest_to(lattice, distance, goal, tolerance_m)
     rows, columns, side = ring(lattice.rows, lattice.columns)
     border = lattice.centres(rows, columns)
     low, high = lattice.centres(np.array([0, lattice.rows - 1]), np.array([0, lattice.columns - 1]))
@@ -122,3 +117,12 @@ def _choose_target(lattice: Lattice, distance: F64, goal: F64, tolerance_m: floa
     remainder = remainder_outside(border, side, low, high, goal)
     best = int(np.argmin(distance[nodes] + remainder))
     return int(nodes[best]), float(remainder[best])
+
+
+def _nearest_to(lattice: Lattice, distance: F64, goal: F64, tolerance_m: float) -> tuple[int, float]:
+    """Return, of the nodes within the tolerance of the goal that can be reached, the nearest, and what remains from there [m]."""
+    rows, columns, remainder = around(lattice, goal, tolerance_m)
+    nodes, remainder = (rows * lattice.columns + columns).ravel(), remainder.ravel()
+    eligible = np.isfinite(distance[nodes]) & (remainder <= tolerance_m)
+    best = int(np.argmin(np.where(eligible, remainder, np.inf)))
+    return int(nodes[best]), float(remainder[best]) if eligible[best] else np.inf

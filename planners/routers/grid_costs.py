@@ -11,6 +11,7 @@ from pydantic import Field
 
 from drivers.interface.settings import Settings
 from estimators.belief import UNKNOWN, Belief, Lattice
+from planners.routers.window import around
 from planners.static_field import static_clearance
 
 F64 = NDArray[np.float64]
@@ -66,9 +67,10 @@ def cost_grid(belief: Belief, settings: GridCosts, robot_radius_m: float) -> Cos
 
     cost = 1.0 + settings.unknown_cost * unknown
     cost += settings.nearness_cost * np.clip(1.0 - gap_m / settings.comfort_m, 0.0, 1.0) ** 2
-    x = lattice.x_m + (np.arange(columns) + 0.5) * cell_m - belief.odom_from_base.x
-    y = lattice.y_m + (np.arange(rows) + 0.5) * cell_m - belief.odom_from_base.y
-    near = np.hypot(*np.meshgrid(x, y)) < settings.escape_m
+    robot = np.array([belief.odom_from_base.x, belief.odom_from_base.y])
+    near_rows, near_columns, away_m = around(lattice, robot, settings.escape_m)
+    near = np.zeros((rows, columns), np.bool_)
+    near[near_rows, near_columns] = away_m < settings.escape_m
     inside_margin = gap_m < 0.0
     cost[inside_margin & near] += settings.escape_cost
     occupied = gap_m <= -robot_radius_m - settings.margin_m

@@ -1,13 +1,37 @@
-"""How far it still is from the border of the rolling window to a goal outside it."""
+"""Places in the rolling window: cells around a point, its border, and how far it still is from there to a goal outside."""
 
 from __future__ import annotations
+
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.belief import Lattice
+
 F64 = NDArray[np.float64]
 
 
+def around(lattice: Lattice, point: F64, reach_m: float) -> tuple[NDArray[np.intp], NDArray[np.intp], F64]:
+    """Return the cells in a square around a point, which holds all whose centres are within reach of it.
+
+    Args:
+        lattice: of the window.
+        point: in odom, shape (2,).
+        reach_m: how far.
+
+    Returns:
+        Rows, shape (m, 1), and columns, shape (n,), to be indexed with together; the centres' distances (m, n) [m].
+    """
+    (low_row, high_row), (low_column, high_column) = lattice.cell_of(np.stack((point - reach_m, point + reach_m)))
+    rows = np.arange(max(low_row, 0), min(high_row + 1, lattice.rows))
+    columns = np.arange(max(low_column, 0), min(high_column + 1, lattice.columns))
+    x = lattice.x_m + (columns + 0.5) * lattice.cell_m - point[0]
+    y = lattice.y_m + (rows + 0.5) * lattice.cell_m - point[1]
+    return rows[:, None], columns, np.hypot(x, y[:, None])
+
+
+@lru_cache(maxsize=4)  # a rolling window alternates between few shapes
 def ring(rows: int, columns: int) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
     """Return row, column and side of the border cells, each shape (n,); sides 0 to 3: lower y, upper x, upper y, lower x."""
     across, down = np.arange(columns), np.arange(rows)

@@ -6,14 +6,14 @@ import pytest
 
 from drivers.interface.geometry import SE2
 from drivers.interface.mission import Goal, Mission
-from estimators.belief import UNKNOWN
+from estimators.belief import UNKNOWN, Lattice
 from planners.polyline import arc_length
 from planners.router import RouterSetup
 from planners.routers.grid import GridRouter
 from planners.routers.grid_graph import GridGraph, trace
 from planners.routers.grid_kernels import pull_straight, segment_cost
 from planners.routers.straight import StraightRouter
-from planners.routers.window import remainder_outside, ring
+from planners.routers.window import around, remainder_outside, ring
 from tests.planners.synthetic import Box, Disc, belief_of, mission_to
 
 
@@ -83,6 +83,17 @@ def test_remainder_is_the_shortest_way_round_the_window(seed):
     chosen = rng.integers(0, len(border), 6)
     found = remainder_outside(border, side, low, high, goal)[chosen]
     assert found == pytest.approx([shortest(border[i]) for i in chosen], rel=1e-6)
+
+
+@pytest.mark.parametrize("point", [(0.31, -0.42), (-1.0, 0.7), (1.05, -1.2), (5.0, 5.0)])
+def test_cells_around_a_point_are_all_that_are_within_reach(point):
+    lattice = Lattice(-1.0, -1.2, 0.1, 19, 22)
+    rows, columns, away_m = around(lattice, np.array(point), 0.4)
+    everywhere = lattice.centres(*np.indices((19, 22)).reshape(2, -1)) - point
+    within = (np.hypot(*everywhere.T) <= 0.4).reshape(19, 22)
+    found = np.zeros_like(within)
+    found[rows, columns] = away_m <= 0.4
+    assert np.array_equal(found, within)
 
 
 def test_pulling_straight_never_costs_more_and_keeps_the_ends():
