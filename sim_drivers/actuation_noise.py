@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from pydantic import Field
@@ -33,17 +34,19 @@ class ActuationNoise:
         self._retained = math.exp(-period_s / settings.time_s)
         self._gain = settings.fraction * math.sqrt(1.0 - self._retained**2)
         self._quiet = settings.fraction == 0.0
-        self._error = settings.fraction * rng.standard_normal(3)  # (3,) of vx, vy, wz; stationary from the start
-        self._draws = np.empty((0, 3))
-        self._next = 0
+        self._errors: list[float] = (
+            settings.fraction * rng.standard_normal(3)
+        ).tolist()  # of vx, vy, wz; stationary from the start
+        self._draws: Iterator[list[float]] = iter(())  # plain numbers: three are too few for an array to be worth its while
 
     def spoil(self, twist: BodyTwist) -> BodyTwist:
         """Return the twist that is really run at for one period."""
         if self._quiet:
             return twist
-        if self._next == len(self._draws):
-            self._draws, self._next = self._gain * self._rng.standard_normal((_BLOCK, 3)), 0
-        self._error = self._retained * self._error + self._draws[self._next]
-        self._next += 1
-        vx, vy, wz = (1.0 + self._error).tolist()
-        return BodyTwist(vx * twist.vx, vy * twist.vy, wz * twist.wz)
+        draw = next(self._draws, None)
+        if draw is None:
+            self._draws = iter((self._gain * self._rng.standard_normal((_BLOCK, 3))).tolist())
+            draw = next(self._draws)
+        self._errors = [self._retained * error + more for error, more in zip(self._errors, draw, strict=True)]
+        vx, vy, wz = self._errors
+        return BodyTwist((1.0 + vx) * twist.vx, (1.0 + vy) * twist.vy, (1.0 + wz) * twist.wz)
