@@ -36,7 +36,7 @@ def static_cells(belief: Belief, margin_m: float) -> Mask | None:
     A track explains the cells within its radius and the margin: it has a future of its own, and where it stood a moment ago is
     free when it has gone.  One that is not certain enough explains none.
     """
-    discs = _discs(belief, margin_m)
+    discs = _discs(movers(belief), margin_m)
     if not discs.size:
         return None
     lattice = belief.grid.lattice
@@ -68,11 +68,13 @@ class Surroundings:
     label: NDArray[np.uint8]  # (rows, columns)
 
 
-def surroundings(belief: Belief, margin_m: float, reach_m: float, far_m: float) -> Surroundings:
+def surroundings(
+    belief: Belief, margin_m: float, reach_m: float, far_m: float, moving: tuple[Track, ...] | None = None
+) -> Surroundings:
     """Return the static clearance where it is needed: within `reach_m` of the robot and up to `far_m`.
 
     It is that of `static_clearance` there, for a fraction of the time; what is farther away than `far_m` may be so by any
-    amount.
+    amount.  `moving`: the tracks whose cells are taken out, where they are not the `movers`.
     """
     grid, cell_m, pose = belief.grid.lattice, belief.grid.lattice.cell_m, belief.odom_from_base
     half = math.ceil(min(float(max(grid.rows, grid.columns)), (reach_m + far_m) / cell_m)) + 2
@@ -80,7 +82,7 @@ def surroundings(belief: Belief, margin_m: float, reach_m: float, far_m: float) 
     left, right = _span((pose.x - grid.x_m) / cell_m, half, grid.columns)
     lattice = Lattice(grid.x_m + left * cell_m, grid.y_m + top * cell_m, cell_m, bottom - top, right - left)
     label = belief.grid.label[top:bottom, left:right].copy()
-    discs = _discs(belief, margin_m)
+    discs = _discs(movers(belief) if moving is None else moving, margin_m)
     if not discs.size:
         return Surroundings(lattice, belief.clearance.clearance_m[top:bottom, left:right].copy(), label)
     occupied: Mask = _without(label, discs, lattice.x_m, lattice.y_m, cell_m)
@@ -95,9 +97,9 @@ def _span(centre: float, half: int, count: int) -> tuple[int, int]:
     return max(0, at - half), min(count, at + half + 1)
 
 
-def _discs(belief: Belief, margin_m: float) -> F64:
+def _discs(moving: tuple[Track, ...], margin_m: float) -> F64:
     """Return x, y and radius of what the tracks explain, shape (n, 3)."""
-    return np.array([(*track.position_in_odom, track.radius_m + margin_m) for track in movers(belief) if _certain(track)])
+    return np.array([(*track.position_in_odom, track.radius_m + margin_m) for track in moving if _certain(track)])
 
 
 def warm_up(label: NDArray[np.uint8]) -> None:

@@ -10,19 +10,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from drivers.interface.commands import BodyTwist, Command
 from drivers.interface.samples import frozen_array
-from drivers.interface.settings import Settings
 from estimators.belief import Belief
 from planners import static_field
 from planners.planner import Diagnostics, Drawing
+from planners.prediction.walls import Walls
 from planners.shield import Filtered, ReachableSet, ShieldSetup
+from planners.shields.answer_kernels import Answer, times_of
+from planners.shields.company import futures, with_resters
 from planners.shields.lattice_kernels import Local, forecast
-from planners.static_field import movers as movers_of
-from planners.static_field import surroundings
-from planners.velocity_lattice import LatticeSettings, VelocityLattice
+from planners.shields.lattice_settings import LatticeShieldSettings
+from planners.shields.resters import Resters
+from planners.static_field import movers, surroundings
+from planners.velocity_lattice import VelocityLattice
 
 F64 = NDArray[np.float64]
 
@@ -45,33 +47,22 @@ class LatticeShieldDiagnostics(Diagnostics):
 class LatticeShield:
     """Lattice filter: what was asked where a short rollout of it keeps clear, else the best candidate of a velocity lattice."""
 
-    class Settings(Settings):
-        """Section 4.4; the paper gives no numbers."""
+    Settings = LatticeShieldSettings
 
-        horizon_s: float = Field(default=1.2, gt=0.0, le=10.0, description="of the rollout")
-        steps: int = Field(default=12, ge=2, le=100)
-        hard_m: float = Field(default=0.05, ge=0.0, le=1.0, description="c_hard")
-        gain: float = Field(default=0.9, gt=0.0, le=1.0, description="kappa: share of the margin that a rollout may take")
-        far_m: float = Field(default=1.0, gt=0.0, le=10.0, description="clearance beyond which more is worth nothing")
-        track_margin_m: float = Field(default=0.10, ge=0.0, le=1.0, description="occupied cells this near to a track are its own")
-        weight_progress: float = Field(default=0.5, ge=0.0, le=100.0, description="per metre towards where the asked twist leads")
-        weight_clearance: float = Field(default=0.5, ge=0.0, le=100.0, description="per metre")
-        weight_closeness: float = Field(default=1.5, ge=0.0, le=100.0, description="per share of the caps between the two")
-        weight_violation: float = Field(
-            default=30.0, ge=0.0, le=1000.0, description="per metre that a candidate is infeasible by"
-        )
-        lattice: LatticeSettings = LatticeSettings()
-
-    def __init__(self, settings: Settings, setup: ShieldSetup) -> None:
+    def __init__(self, settings: LatticeShieldSettings, setup: ShieldSetup) -> None:
         """Lay the lattice."""
         self._settings, self._radius_m = settings, setup.robot_radius_m
-        self._twists, self._caps, self._acceleration = np.zeros((0, 3)), np.ones(3), np.ones(3)
+        self._twists, self._caps, acceleration = np.zeros((0, 3)), np.ones(3), np.ones(3)
         if setup.limits is not None:
             lattice, limits = VelocityLattice.of(settings.lattice, setup.limits), setup.limits
             speeds, turns = np.meshgrid(lattice.speed_m_s, lattice.turn_rad_s, indexing="ij")
             self._twists = np.stack((speeds.ravel(), np.zeros(len(lattice)), turns.ravel()), axis=1)
             self._caps = np.array([limits.velocity.vx, max(limits.velocity.vy, 1.0), limits.velocity.wz])
-            self._acceleration = np.array([limits.acceleration.vx, limits.acceleration.vy, limits.acceleration.wz])
+            acceleration = np.array([limits.acceleration.vx, limits.acceleration.vy, limits.acceleration.wz])
+        s, base = settings, settings.lattice
+        step_s, after_step_s = s.horizon_s / s.steps, s.after_s / s.after_steps
+        self._answer = Answer(acceleration, base.latency_s, base.response_s, step_s, s.steps, after_step_s, s.after_steps)
+        self._times_s, self._resters = times_of(self._answer), Resters(s.patience_s)
 
     @property
     def kept_clear_m(self) -> float:
@@ -83,8 +74,9 @@ class LatticeShield:
         label = frozen_array(np.zeros((3, 3), np.uint8))
         static_field.warm_up(label)
         for field in (np.ones((3, 3), np.float32), frozen_array(np.ones((3, 3), np.float32))):
-            local = Local(field, 0.0, 0.0, 1.0, np.zeros((1, 5)), 0.1, 1.0)
-            forecast(np.zeros(3), np.zeros(3), np.zeros((1, 3)), np.ones(3), 0.1, 0.1, 0.1, 2, local)
+            where, radius_m = futures((), (), self._times_s, Walls(field, 0.0, 0.0, 1.0))
+            local = Local(field, 0.0, 0.0, 1.0, where, radius_m, 0.1, 1.0)
+            forecast(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((1, 3)), self._answer, local)
 
     def filter(self, command: Command, belief: Belief, reachable: ReachableSet) -> Filtered:
         """Return the command with its twist filtered into `reachable`; one that is not finite counts as a stop."""
@@ -92,7 +84,7 @@ class LatticeShield:
             return Filtered(command)
         asked = command.base if command.base.finite else BodyTwist()
         twists = self._candidates(asked)
-        least, end, here = self._forecast(belief, twists)
+        least, end, here = self._forecast(belief, twists, reachable)
         violation = self._violation(least, here)
         feasible = violation == 0.0
         chosen = self._choose(twists, least, end - (belief.odom_from_base.x, belief.odom_from_base.y), violation, here)
@@ -104,33 +96,31 @@ class LatticeShield:
         return Filtered(replace(command, base=twist), twist != reachable.clip(command.base), said, drawings)
 
     def snapshot(self) -> bytes:
-        """Return nothing: it has no state."""
-        return b""
+        """Return the whole state: how everybody came."""
+        return self._resters.snapshot()
 
     def restore(self, snapshot: bytes) -> None:
-        """Nothing to take over."""
+        """Take over a state."""
+        self._resters.restore(snapshot)
 
     def _candidates(self, asked: BodyTwist) -> F64:
         """Return A_t, shape (n, 3), the asked twist first."""
         own = np.array([_NOMINAL_SHARES]).T * (asked.vx, asked.vy, asked.wz)
         return np.concatenate((own, self._twists))
 
-    def _forecast(self, belief: Belief, twists: F64) -> tuple[F64, F64, float]:
-        s, pose, now = self._settings, belief.odom_from_base, belief.twist
-        movers = [
-            (*track.position_in_odom, *track.velocity_in_odom, track.radius_m + self._radius_m) for track in movers_of(belief)
-        ]
-        known = np.array(movers).reshape(-1, 5)
-        known = known[np.isfinite(known).all(axis=1)]
+    def _forecast(self, belief: Belief, twists: F64, reachable: ReachableSet) -> tuple[F64, F64, float]:
+        s, pose, now, answer = self._settings, belief.odom_from_base, belief.twist, self._answer
+        resting = self._resters.observe(belief)
+        moving = with_resters(movers(belief), resting)
         fastest = max(math.hypot(now.vx, now.vy), math.sqrt(float((twists[:, :2] ** 2).sum(axis=1).max())))
-        reach_m = fastest * (s.lattice.latency_s + s.horizon_s)
-        near = surroundings(belief, s.track_margin_m, reach_m, s.far_m + self._radius_m)
+        reach_m = fastest * self._times_s[-1]
+        near = surroundings(belief, s.track_margin_m, reach_m, s.far_m + self._radius_m, moving)
         at = near.lattice
-        local = Local(near.clearance_m, at.x_m, at.y_m, at.cell_m, known, self._radius_m, s.far_m)
+        where, radius_m = futures(moving, resting, self._times_s, Walls(near.clearance_m, at.x_m, at.y_m, at.cell_m))
+        local = Local(near.clearance_m, at.x_m, at.y_m, at.cell_m, where, radius_m + self._radius_m, self._radius_m, s.far_m)
         told: tuple[F64, F64, float] = forecast(
-            np.array([pose.x, pose.y, pose.yaw]), np.array([now.vx, now.vy, now.wz]), twists, self._acceleration,
-            s.lattice.latency_s, s.lattice.response_s, s.horizon_s / s.steps, s.steps, local,
-        )  # fmt: skip
+            np.array([pose.x, pose.y, pose.yaw]), np.array([now.vx, now.vy, now.wz]), _middle(reachable), twists, answer, local
+        )
         return told
 
     def _violation(self, least_m: F64, here_m: float) -> F64:
@@ -152,3 +142,9 @@ class LatticeShield:
         towards = moved[0] / length_m if length_m > _TIE else np.zeros(2)
         worth = s.weight_progress * (moved @ towards) + s.weight_clearance * least_m - s.weight_closeness * away
         return int(np.argmax(worth - s.weight_violation * violation_m))
+
+
+def _middle(reachable: ReachableSet) -> F64:
+    """Return the middle of what can be sent now, shape (3,): what was sent last goes on to there."""
+    low, high = reachable.lowest, reachable.highest
+    return 0.5 * np.array([low.vx + high.vx, low.vy + high.vy, low.wz + high.wz])

@@ -14,6 +14,7 @@ from planners.point_ds.planner import PointAttractor
 from planners.router import RouterSetup
 from planners.routers.straight import StraightRouter
 from planners.shield import ShieldSetup
+from planners.shields.answer_kernels import Answer
 from planners.shields.lattice import LatticeShield
 from planners.shields.lattice_kernels import Local, forecast
 from tests.planners.synthetic import DIFFERENTIAL, OMNI, Box, Disc, belief_of, command_of, drive, reachable_from
@@ -105,10 +106,68 @@ def test_a_planner_that_sees_nothing_does_not_collide_under_it():
     assert trace.poses[-1].x > 0.5
 
 
-def test_the_forecast_is_the_motion_of_a_base_that_answers_late():
-    """From rest to 0.5 m/s at 1 m/s^2 after a latency: 0.125 m while speeding up, then 0.5 m/s."""
-    local = Local(np.full((3, 3), 9.0, np.float32), -1.0, -1.0, 1.0, np.zeros((0, 5)), 0.2, 5.0)
-    twists = np.array([[0.5, 0.0, 0.0]])
-    _, end, here = forecast(np.zeros(3), np.zeros(3), twists, np.ones(3), 0.3, 0.0, 0.001, 2000, local)
-    assert end[0] == pytest.approx([0.125 + 0.5 * 1.5, 0.0], abs=1e-3)
+def driven_from_rest(response_s):
+    """Return where half a metre per second asked of a standing base, 1 m/s^2 after 0.3 s of latency, leads in 2.3 s, (2,)."""
+    answer = Answer(np.ones(3), 0.3, response_s, 0.001, 2000, 0.1, 1)
+    nobody, alone = np.zeros((2003, 0, 2), np.float32), np.zeros(0)
+    local = Local(np.full((3, 3), 9.0, np.float32), -1.0, -1.0, 1.0, nobody, alone, 0.2, 5.0)
+    _, end, here = forecast(np.zeros(3), np.zeros(3), np.zeros(3), np.array([[0.5, 0.0, 0.0]]), answer, local)
     assert here == 5.0
+    return end[0]
+
+
+def test_the_forecast_is_the_motion_of_a_base_that_answers_late():
+    """0.125 m while speeding up, then 0.5 m/s; a lag of T keeps it T seconds of its speed behind."""
+    assert driven_from_rest(0.0) == pytest.approx([0.125 + 0.5 * 1.5, 0.0], abs=1e-3)
+    assert driven_from_rest(0.1) == pytest.approx([0.125 + 0.5 * 1.5 - 0.5 * 0.1, 0.0], abs=1e-3)
+
+
+def test_to_run_ahead_of_somebody_faster_is_no_way_out():
+    """He is 1.1 m behind and 0.5 m/s faster: after 1.3 s there is room, after 2.5 s there is none, stopping or not."""
+    behind = (coming(-1.6, 1.0),)
+    assert filtered([], tracks=behind, after_s=0.1).diagnostics.asked_feasible
+    assert not filtered([], tracks=behind).diagnostics.asked_feasible
+
+
+def test_a_twist_that_can_be_stopped_afterwards_is_safe_before_a_wall():
+    """Kept up it meets the wall 1.1 m off after 2.3 s, but nothing keeps it from stopping then."""
+    assert filtered([Box(RADIUS_M + 1.1, -3, 3.0, 3)]).diagnostics.asked_feasible
+
+
+def test_nobody_comes_through_a_wall():
+    across, wall = Track(0, (0.5, 1.3), (0.0, -0.7), 0.25, frozen_array(np.zeros((4, 4)))), Box(-2, 0.6, 2, 0.7)
+    assert not filtered([], BodyTwist(), BodyTwist(), tracks=(across,)).diagnostics.asked_feasible
+    assert filtered([wall], BodyTwist(), BodyTwist(), tracks=(across,)).diagnostics.asked_feasible
+
+
+def after_he_came(shield, came_m, rested_s):
+    """Filter while somebody comes at 0.7 m/s to 0.4 m before a robot that stands, seen for so long, and rests there."""
+    last_m = 2 * RADIUS_M + 0.4
+    ticks = [*np.arange(came_m, 0.0, -0.7 * PERIOD_S), *np.zeros(round(rested_s / PERIOD_S))]
+    for k, off_m in enumerate(ticks):
+        him = coming(last_m + off_m, -0.7 if off_m > 0.0 else 0.0)
+        belief = belief_of([Disc(last_m + off_m, 0.0, 0.25)], size_m=3.0, cell_m=0.1)
+        belief = replace(belief, tracks=(him,), stamp_ns=round(k * PERIOD_S * 1e9))
+        result = shield.filter(command_of(BodyTwist()), belief, reachable_from(BodyTwist(), DIFFERENTIAL, PERIOD_S))
+    return result
+
+
+def test_out_of_the_way_of_who_came_and_stopped_as_he_may_go_on():
+    result = after_he_came(shield_of(), came_m=0.6, rested_s=0.3)
+    assert not result.diagnostics.asked_feasible
+    assert result.command.base.vx < 0.0
+
+
+@pytest.mark.parametrize(("came_m", "rested_s"), [(0.1, 0.3), (0.6, 1.3)], ids=["a post", "he stays"])
+def test_who_did_not_come_or_has_stood_for_long_stays(came_m, rested_s):
+    assert after_he_came(shield_of(patience_s=1.0), came_m, rested_s).diagnostics.asked_feasible
+
+
+def test_a_shield_that_takes_over_knows_how_he_came():
+    first, second = shield_of(), shield_of()
+    after_he_came(first, came_m=0.6, rested_s=0.3)
+    second.restore(first.snapshot())
+    again = [after_he_came(shield, came_m=0.0, rested_s=PERIOD_S) for shield in (first, second)]
+    assert not again[0].diagnostics.asked_feasible
+    assert again[0].command == again[1].command
+    assert first.snapshot() == second.snapshot()
