@@ -5,6 +5,7 @@ The looks of a rollout are: now, the end of the latency, the end of each step, a
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -26,10 +27,16 @@ class Answer(NamedTuple):
     after_steps: int
 
 
-def times_of(answer: Answer) -> F64:
-    """Return when the looks are, shape (1 + 1 + steps + after_steps,) [s]: now, after the latency, after each step."""
-    steps = np.repeat((answer.step_s, answer.after_step_s), (answer.steps, answer.after_steps))
-    return np.concatenate(((0.0,), answer.latency_s + np.concatenate(((0.0,), np.cumsum(steps)))))
+def times_of(answer: Answer) -> tuple[F64, NDArray[np.int64]]:
+    """Return times no farther apart than a step, shape (m,) [s], and which of them are the looks.
+
+    The looks, shape (1 + 1 + steps + after_steps,), are now, after the latency, and after each step.
+    """
+    parts = max(1, math.ceil(answer.after_step_s / answer.step_s - 1e-9))
+    steps = np.repeat((answer.step_s, answer.after_step_s / parts), (answer.steps, answer.after_steps * parts))
+    times_s = np.concatenate(((0.0,), answer.latency_s + np.concatenate(((0.0,), np.cumsum(steps)))))
+    till = 2 + answer.steps
+    return times_s, np.concatenate((np.arange(till), np.arange(till + parts - 1, len(times_s), parts)))
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -62,7 +62,7 @@ class LatticeShield:
         s, base = settings, settings.lattice
         step_s, after_step_s = s.horizon_s / s.steps, s.after_s / s.after_steps
         self._answer = Answer(acceleration, base.latency_s, base.response_s, step_s, s.steps, after_step_s, s.after_steps)
-        self._times_s, self._resters = times_of(self._answer), Resters(s.patience_s)
+        (self._times_s, self._looks), self._resters = times_of(self._answer), Resters(s.patience_s)
 
     @property
     def kept_clear_m(self) -> float:
@@ -75,7 +75,7 @@ class LatticeShield:
         static_field.warm_up(label)
         for field in (np.ones((3, 3), np.float32), frozen_array(np.ones((3, 3), np.float32))):
             where, radius_m = futures((), (), self._times_s, Walls(field, 0.0, 0.0, 1.0))
-            local = Local(field, 0.0, 0.0, 1.0, where, radius_m, 0.1, 1.0)
+            local = Local(field, 0.0, 0.0, 1.0, where[self._looks], radius_m, 0.1, 1.0)
             forecast(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((1, 3)), self._answer, local)
 
     def filter(self, command: Command, belief: Belief, reachable: ReachableSet) -> Filtered:
@@ -117,7 +117,9 @@ class LatticeShield:
         near = surroundings(belief, s.track_margin_m, reach_m, s.far_m + self._radius_m, moving)
         at = near.lattice
         where, radius_m = futures(moving, resting, self._times_s, Walls(near.clearance_m, at.x_m, at.y_m, at.cell_m))
-        local = Local(near.clearance_m, at.x_m, at.y_m, at.cell_m, where, radius_m + self._radius_m, self._radius_m, s.far_m)
+        local = Local(
+            near.clearance_m, at.x_m, at.y_m, at.cell_m, where[self._looks], radius_m + self._radius_m, self._radius_m, s.far_m
+        )
         told: tuple[F64, F64, float] = forecast(
             np.array([pose.x, pose.y, pose.yaw]), np.array([now.vx, now.vy, now.wz]), _middle(reachable), twists, answer, local
         )

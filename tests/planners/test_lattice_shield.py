@@ -158,6 +158,18 @@ def test_out_of_the_way_of_who_came_and_stopped_as_he_may_go_on():
     assert result.command.base.vx < 0.0
 
 
+def test_who_stopped_before_a_wall_turns_back():
+    """He came past the robot to a wall, and rests there: he may come again, as far as he may go on where there is none."""
+    for walls, turns_back in (([Box(1.6, -3, 1.7, 3)], True), ([], False)):
+        shield = shield_of()
+        for k, x in enumerate([*np.arange(0.7, 1.3, 0.7 * PERIOD_S), *np.full(6, 1.3)]):
+            him = coming(x, 0.7 if x < 1.3 else 0.0)
+            belief = belief_of([Disc(x, 0.0, 0.25), *walls], size_m=4.0)
+            belief = replace(belief, tracks=(him,), stamp_ns=round(k * PERIOD_S * 1e9))
+            result = shield.filter(command_of(BodyTwist()), belief, reachable_from(BodyTwist(), DIFFERENTIAL, PERIOD_S))
+        assert result.diagnostics.asked_feasible != turns_back
+
+
 @pytest.mark.parametrize(("came_m", "rested_s"), [(0.1, 0.3), (0.6, 1.3)], ids=["a post", "he stays"])
 def test_who_did_not_come_or_has_stood_for_long_stays(came_m, rested_s):
     assert after_he_came(shield_of(patience_s=1.0), came_m, rested_s).diagnostics.asked_feasible
