@@ -1,7 +1,7 @@
 """Who may set off: tracks that came here on their own and have slowed down or stand, and the velocity that they came with.
 
 A constant velocity says of one who stops to let somebody by, or hesitates, that he stays for good.  Whoever came may go on; who
-never left his place is a post.
+never left his place is a post.  A tracker soon takes who stands for a part of the grid: he is remembered where he stood.
 """
 
 from __future__ import annotations
@@ -11,22 +11,29 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drivers.interface.samples import frozen_array
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import Belief, Track
+from estimators.field_query import sample
+from planners.static_field import GRID_M, STILL_M_S
 
 SECOND_NS = 1_000_000_000
 CAME_M = 0.3  # from where it was first seen; what stands, and is seen from here and from there, shifts by less
 SLOWED = 0.7  # of the velocity that it came with
+_EXACT = frozen_array(np.zeros((4, 4)))
 
 
 @dataclass(frozen=True, slots=True)
 class _Way:
-    """Where a track was first seen, and the velocity that it last kept up, in odom."""
+    """How a track came; odom frame."""
 
-    origin: tuple[float, float]
+    origin: tuple[float, float]  # where it was first seen
     came: bool  # it has left its origin
-    velocity: tuple[float, float]
+    velocity: tuple[float, float]  # that it last kept up
     kept_ns: int  # when it last drove as fast as that
+    place: tuple[float, float]  # where it stood when it stood last
+    radius_m: float
+    stands: bool
 
 
 class Resters:
@@ -40,7 +47,10 @@ class Resters:
     def observe(self, belief: Belief) -> tuple[tuple[Track, tuple[float, float]], ...]:
         """Take in the tracks of a belief; return those that may set off, and with which velocity [m/s] in odom."""
         tracks = [track for track in belief.tracks if np.isfinite((*track.position_in_odom, *track.velocity_in_odom)).all()]
-        self._ways = {track.identity: self._way(track, belief.stamp_ns) for track in tracks}
+        seen = {track.identity for track in tracks}
+        left = {name: way for name, way in self._ways.items() if name not in seen and self._waits(way, tracks, belief)}
+        self._ways = {track.identity: self._way(track, belief.stamp_ns) for track in tracks} | left
+        tracks += [Track(name, way.place, (0.0, 0.0), way.radius_m, _EXACT) for name, way in left.items()]
         found = ((track, self._ways[track.identity]) for track in tracks)
         return tuple(
             (track, way.velocity)
@@ -48,33 +58,44 @@ class Resters:
             if way.came and math.hypot(*track.velocity_in_odom) < SLOWED * math.hypot(*way.velocity)
         )
 
+    def _waits(self, way: _Way, tracks: list[Track], belief: Belief) -> bool:
+        """Return whether somebody who is no track any more still stands where he stood: as a part of the grid."""
+        if not (way.came and way.stands) or belief.stamp_ns - way.kept_ns > self._patience_ns:
+            return False
+        if any(math.dist(way.place, track.position_in_odom) < way.radius_m for track in tracks):
+            return False
+        field = belief.clearance
+        return float(sample(field.clearance_m, field.lattice, np.array([way.place]))[0]) <= way.radius_m + GRID_M
+
     def _way(self, track: Track, now_ns: int) -> _Way:
-        here, now = track.position_in_odom, track.velocity_in_odom
+        here, now, radius_m = track.position_in_odom, track.velocity_in_odom, track.radius_m
         before = self._ways.get(track.identity)
         if before is None:
-            return _Way(here, False, now, now_ns)
+            return _Way(here, False, now, now_ns, here, radius_m, False)
+        speed_m_s = math.hypot(*now)
         came = before.came or math.dist(here, before.origin) > CAME_M
-        kept = math.hypot(*now) >= SLOWED * math.hypot(*before.velocity)
+        kept = speed_m_s >= SLOWED * math.hypot(*before.velocity)
+        place, stands = (here, True) if speed_m_s < STILL_M_S else (before.place, before.stands and not kept)
         if kept or now_ns - before.kept_ns > self._patience_ns:
-            return _Way(before.origin, came, now, now_ns)
-        return _Way(before.origin, came, before.velocity, before.kept_ns)
+            return _Way(before.origin, came, now, now_ns, place, radius_m, stands)
+        return _Way(before.origin, came, before.velocity, before.kept_ns, place, radius_m, stands)
 
     def snapshot(self) -> bytes:
         """Return the whole state."""
         ways = self._ways.values()
         return pack(
             identity=np.array(list(self._ways), np.int64),
-            origin=np.array([way.origin for way in ways]).reshape(-1, 2),
+            numbers=np.array([(*way.origin, *way.velocity, *way.place, way.radius_m) for way in ways]).reshape(-1, 7),
             came=np.array([way.came for way in ways], np.bool_),
-            velocity=np.array([way.velocity for way in ways]).reshape(-1, 2),
+            stands=np.array([way.stands for way in ways], np.bool_),
             kept_ns=np.array([way.kept_ns for way in ways], np.int64),
         )
 
     def restore(self, snapshot: bytes) -> None:
         """Take over a state."""
         state = unpack(snapshot)
-        rows = zip(*(state[name].tolist() for name in ("identity", "origin", "came", "velocity", "kept_ns")), strict=True)
+        rows = zip(*(state[name].tolist() for name in ("identity", "numbers", "came", "stands", "kept_ns")), strict=True)
         self._ways = {
-            identity: _Way((origin[0], origin[1]), came, (velocity[0], velocity[1]), kept_ns)
-            for identity, origin, came, velocity, kept_ns in rows
+            name: _Way((n[0], n[1]), came, (n[2], n[3]), kept_ns, (n[4], n[5]), n[6], stands)
+            for name, n, came, stands, kept_ns in rows
         }
