@@ -93,7 +93,7 @@ class Rcsp:
             self._last = self._standing
             said = RcspDiagnostics(stopped=reason, budget_ms=(budget_ns or 0) / 1e6, obstacles=obstacles)
             return Plan(BodyTwist(), diagnostics=said)
-        path, along = self._ahead(route)
+        path, along = _staying(belief) if route.empty else self._ahead(route)
         around = self._ground(belief)
         rolled = self._rolled_out(belief, around)
         room_m = least_room(path[1 : np.searchsorted(along, self._reach_m, side="right")], around)
@@ -108,10 +108,13 @@ class Rcsp:
     def _refusal(self, belief: Belief, route: Route) -> str:
         """Return why there is nothing to do, or nothing."""
         pose = belief.odom_from_base
-        if route.empty:
+        makes_way = route.blocked and self._settings.blocked == "make_way"
+        if route.empty and not makes_way:
             return "the way is blocked" if route.blocked else "no goal"
         if not (belief.twist.finite and math.isfinite(pose.x) and math.isfinite(pose.y) and math.isfinite(pose.yaw)):
             return "the pose or the twist is not finite"
+        if route.empty:
+            return ""
         end_x, end_y = route.path_in_odom[-1].tolist()
         if math.hypot(end_x - pose.x, end_y - pose.y) < self._settings.arrival_m:
             return "arrived"
@@ -215,6 +218,12 @@ class Rcsp:
         state = unpack(snapshot)
         self._last = int(state["last"])
         self._predictor.restore(state["predictor"].tobytes())
+
+
+def _staying(belief: Belief) -> tuple[F64, F64]:
+    """Return the way of who has none and stays where he is, as `Rcsp._ahead` would: away from there is no progress."""
+    pose = belief.odom_from_base
+    return np.array([[pose.x, pose.y]] * 2), np.zeros(2)
 
 
 def _judged_at(steps: int) -> tuple[int, ...]:

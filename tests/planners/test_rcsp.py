@@ -12,7 +12,7 @@ from drivers.interface.errors import ConfigurationError
 from drivers.interface.geometry import SE2
 from drivers.interface.samples import frozen_array
 from estimators.belief import Track
-from planners.planner import Anytime, PlannerSetup
+from planners.planner import Anytime, PlannerSetup, no_path
 from planners.prediction.predictor import Futures
 from planners.rcsp.budget import affordable
 from planners.rcsp.evaluation import Evaluation
@@ -29,7 +29,7 @@ from planners.rcsp.kernels import (
 )
 from planners.rcsp.planner import Rcsp
 from planners.rcsp.progress_kernels import to_go
-from planners.router import RouterSetup
+from planners.router import Route, RouterSetup
 from planners.routers.straight import StraightRouter
 from planners.shield import ShieldSetup
 from planners.shields.none import NoShield
@@ -167,6 +167,17 @@ def test_where_every_candidate_is_infeasible_it_takes_the_least_risk_and_says_so
     assert plan.diagnostics.stopped == "every candidate is infeasible"
     assert plan.diagnostics.free == 0
     assert plan.base.speed_m_s <= 0.1
+
+
+@pytest.mark.parametrize("vx", [-0.8, 0.0])
+@pytest.mark.parametrize("blocked", ["stand", "make_way"])
+def test_while_the_way_is_blocked_it_makes_way_for_who_comes_where_the_setting_says_so(blocked, vx):
+    belief = belief_with(track(1.6, 0.0, vx=vx))
+    plan = planner_of(blocked=blocked).plan(belief, Route((6.0, 0.0), no_path(), 0.0, blocked=True))
+    goes = blocked == "make_way" and vx < 0.0  # from who stands there it need not go
+    assert (plan.base != STANDING) == goes
+    assert plan.base.vx <= 0.0
+    assert (plan.diagnostics.stopped == "the way is blocked") == (blocked == "stand")
 
 
 @pytest.mark.parametrize(("gap_m", "speed"), [(0.06, 0.0), (0.35, 0.7)])
