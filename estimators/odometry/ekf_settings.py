@@ -53,6 +53,10 @@ class EkfSettings(Settings):
     )
     position_variance_m2_per_m: float = Field(default=2e-4, ge=0.0, le=1.0, description="slip of the wheels, each axis")
     position_variance_m2_per_rad: float = Field(default=2e-5, ge=0.0, le=1.0, description="slip of the wheels in turning")
+    skid_along_std_m_per_rad: float = Field(
+        default=0.0, ge=0.0, le=5.0, description="how wrong the way is forwards where a base skids in turns"
+    )
+    skid_across_std_m_per_rad: float = Field(default=0.0, ge=0.0, le=5.0, description="and sideways")
     yaw_variance_rad2_per_m: float = Field(default=1e-4, ge=0.0, le=1.0, description="slip of the wheels")
     yaw_variance_rad2_per_rad: float = Field(default=2e-3, ge=0.0, le=1.0, description="slip of the wheels in turning")
     way_scale_std: float = Field(default=0.03, ge=0.0, le=1.0, description="the wheels' way is wrong by this fraction")
