@@ -8,6 +8,13 @@ from drivers.interface.settings import Settings
 from planners.velocity_lattice import LatticeSettings
 
 
+class FilterLatticeSettings(LatticeSettings):
+    """Candidates, and how the base answers what is sent to it, ramp, delay and lag together."""
+
+    latency_s: float = Field(default=0.1, ge=0.0, le=1.0, description="from the belief to when the drives hear of the command")
+    response_s: float = Field(default=0.12, ge=0.0, le=2.0, description="time constant with which the base follows what is sent")
+
+
 class LatticeShieldSettings(Settings):
     """Section 4.4; the paper gives no numbers."""
 
@@ -24,4 +31,4 @@ class LatticeShieldSettings(Settings):
     after_s: float = Field(default=1.2, gt=0.0, le=10.0, description="going on, or a stop, has to keep clear for so long then")
     after_steps: int = Field(default=6, ge=1, le=100)
     patience_s: float = Field(default=4.0, ge=0.0, le=60.0, description="who came and stands may set off again for so long")
-    lattice: LatticeSettings = LatticeSettings()
+    lattice: FilterLatticeSettings = FilterLatticeSettings()
