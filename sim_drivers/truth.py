@@ -62,15 +62,20 @@ class SimTruth(SimSensor[TruthSample]):
         self._clearance = RobotClearance(model)
         self._clearance.measure(world.data)
 
-    def latest(self) -> TruthSample | None:
-        """Return the truth now, or None before the first.
+    def drain(self) -> tuple[TruthSample, ...]:
+        """Return all looks since the last call as one sample, or nothing.
 
         Where walkers were follows from the time alone, so they are looked up here, for the newest look only.
         """
-        looks = self.drain()
-        if looks:
-            newest = merged_truth(looks)
-            self._newest = replace(newest, obstacles=(*self._walkers(self._looked_s), *newest.obstacles))
+        looks = super().drain()
+        if not looks:
+            return ()
+        newest = merged_truth(looks)
+        return (replace(newest, obstacles=(*self._walkers(self._looked_s), *newest.obstacles)),)
+
+    def latest(self) -> TruthSample | None:
+        """Return the truth now, or None before the first."""
+        self._newest = next(iter(self.drain()), self._newest)
         return self._newest if self._state is DeviceState.OPEN else None
 
     def _measure(self, world: MujocoWorld, stamp: Stamp) -> TruthSample:
