@@ -18,11 +18,11 @@ from planners import static_field
 from planners.planner import Diagnostics, Drawing
 from planners.prediction.walls import Walls
 from planners.shield import Filtered, ReachableSet, ShieldSetup
-from planners.shields.answer_kernels import Answer, times_of
-from planners.shields.company import futures, with_resters
+from planners.shields.lattice_answer_kernels import Answer, times_of
+from planners.shields.lattice_company import futures, with_resters
 from planners.shields.lattice_kernels import Local, forecast
+from planners.shields.lattice_resters import Resters
 from planners.shields.lattice_settings import LatticeShieldSettings
-from planners.shields.resters import Resters
 from planners.static_field import movers, surroundings
 from planners.velocity_lattice import VelocityLattice
 

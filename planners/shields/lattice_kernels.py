@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from estimators.field_query import bilinear
-from planners.shields.answer_kernels import Answer, approached, courses, shares
+from planners.shields.lattice_answer_kernels import Answer, approached, courses, shares
 
 F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]

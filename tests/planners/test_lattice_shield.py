@@ -14,8 +14,8 @@ from planners.point_ds.planner import PointAttractor
 from planners.router import RouterSetup
 from planners.routers.straight import StraightRouter
 from planners.shield import ShieldSetup
-from planners.shields.answer_kernels import Answer
 from planners.shields.lattice import LatticeShield
+from planners.shields.lattice_answer_kernels import Answer
 from planners.shields.lattice_kernels import Local, forecast
 from tests.planners.synthetic import DIFFERENTIAL, OMNI, Box, Disc, belief_of, command_of, drive, reachable_from
 
