@@ -58,7 +58,6 @@ class Axes:
         self._health = port.health
         self._ring = port.rings["wheels"]
         self._wire = wire
-        self._missed = [0] * len(settings.node_ids)  # believed encoder frames since the last sample, of each axis
         self._sequence = self._ring.written
         self._newest_ns = -1  # when the last sample was captured
         self.load = LoadMeter(settings.bit_rate)
@@ -109,6 +108,7 @@ class Axes:
             )
             for index, node in enumerate(s.node_ids)
         ]
+        self._missed = [0] * len(self.each)  # believed encoder frames since the last sample, of each axis
         self._by_node = {axis.node: index for index, axis in enumerate(self.each)}
         self._heard = {self._codec[name].command: self._codec[name] for name in HEARD if name in self._codec}
         self._told = {self._codec[name].command for name in TOLD}

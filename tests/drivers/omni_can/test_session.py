@@ -60,6 +60,21 @@ def test_it_finds_out_which_firmware_answers(answers, protocol, firmware):
     assert (driven.is_open, driven.health.protocol, driven.health.firmware) == (True, f"CANSimple {firmware[:3]}", firmware)
 
 
+def test_what_the_encoders_said_before_the_firmware_was_known_makes_no_sample():
+    """An encoder frame that overtakes the answer to Get_Version belongs to axes that are forgotten with the answer."""
+    driven = Driven(firmware="auto", verify_watchdog=False)
+    driven.bus.put(NODES[2] << 5 | 9, "00 00 00 00 00 00 80 3f")
+    driven.bus.put(NODES[2] << 5, "02 05 02 00 00 06 0a 00")
+    for node in NODES[:2]:
+        driven.bus.put(node << 5 | 9, "00 00 00 00 00 00 00 40")
+    driven.poll()
+    assert len(driven.samples()) == 0
+    driven.bus.put(NODES[2] << 5 | 9, "00 00 00 00 00 00 00 40")
+    driven.poll(10)
+    (sample,) = driven.samples()
+    assert sample["turns_s"].tolist() == [2.0, 2.0, 2.0]
+
+
 def test_every_watchdog_trips_once_before_it_is_open_and_only_while_it_is_silent():
     driven = Driven()
     driven.hear(TRIPPED)  # it has tripped before, which proves nothing
