@@ -33,12 +33,12 @@ class LatticeSettings(Settings):
     """The command set U and how the base answers; 11 x 15 = 165 commands."""
 
     max_speed_m_s: float = Field(default=0.65, gt=0.0, le=5.0, description="cruise cap, below the base's own")
-    reverse_m_s: float = Field(default=0.3, ge=0.0, le=5.0, description="fastest backwards, where the base may reverse at all")
+    reverse_m_s: float = Field(default=0.65, ge=0.0, le=5.0, description="fastest backwards, where the base may reverse at all")
     max_turn_rad_s: float = Field(default=1.5, gt=0.0, le=10.0, description="below the base's own")
     speeds: int = Field(default=11, ge=2, le=101)
     turns: int = Field(default=15, ge=3, le=101)
-    latency_s: float = Field(default=0.05, ge=0.0, le=1.0, description="from the belief to when the drives hear of the command")
-    response_s: float = Field(default=0.08, ge=0.0, le=2.0, description="time constant with which the base's velocity follows")
+    latency_s: float = Field(default=0.1, ge=0.0, le=1.0, description="from the belief to when the drives hear of the command")
+    response_s: float = Field(default=0.12, ge=0.0, le=2.0, description="time constant with which the base's velocity follows")
 
 
 @dataclass(frozen=True, slots=True)

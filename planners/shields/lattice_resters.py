@@ -29,7 +29,7 @@ class _Way:
 
     origin: tuple[float, float]  # where it was first seen
     came: bool  # it has left its origin
-    velocity: tuple[float, float]  # that it last kept up
+    velocity: tuple[float, float]  # that it last kept up; until it came, that of now, as a new track's is a guess
     kept_ns: int  # when it last drove as fast as that
     place: tuple[float, float]  # where it stood when it stood last
     radius_m: float
@@ -76,7 +76,7 @@ class Resters:
         came = before.came or math.dist(here, before.origin) > CAME_M
         kept = speed_m_s >= SLOWED * math.hypot(*before.velocity)
         place, stands = (here, True) if speed_m_s < STILL_M_S else (before.place, before.stands and not kept)
-        if kept or now_ns - before.kept_ns > self._patience_ns:
+        if kept or not came or now_ns - before.kept_ns > self._patience_ns:
             return _Way(before.origin, came, now, now_ns, place, radius_m, stands)
         return _Way(before.origin, came, before.velocity, before.kept_ns, place, radius_m, stands)
 

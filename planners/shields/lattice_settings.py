@@ -9,10 +9,9 @@ from planners.velocity_lattice import LatticeSettings
 
 
 class FilterLatticeSettings(LatticeSettings):
-    """Candidates, and how the base answers what is sent to it, ramp, delay and lag together."""
+    """Candidates: backwards it goes slowly, unless it is asked to go faster."""
 
-    latency_s: float = Field(default=0.1, ge=0.0, le=1.0, description="from the belief to when the drives hear of the command")
-    response_s: float = Field(default=0.12, ge=0.0, le=2.0, description="time constant with which the base follows what is sent")
+    reverse_m_s: float = Field(default=0.3, ge=0.0, le=5.0, description="fastest backwards, where the base may reverse at all")
 
 
 class LatticeShieldSettings(Settings):

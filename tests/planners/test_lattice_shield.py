@@ -177,6 +177,16 @@ def test_who_did_not_come_or_has_stood_for_long_stays(came_m, rested_s):
     assert after_he_came(shield_of(patience_s=1.0), came_m, rested_s).diagnostics.asked_feasible
 
 
+def test_what_a_new_track_is_first_taken_for_is_not_how_he_came():
+    """His first velocity is a guess: he seems to rush at the robot, but comes past it, and goes on past it."""
+    shield = shield_of()
+    for k, y in enumerate(np.arange(-1.2, 0.0, 0.5 * PERIOD_S)):
+        seen = replace(coming(1.2, 0.0), position_in_odom=(1.2, y), velocity_in_odom=(-0.8, 0.1) if k < 3 else (0.0, 0.5))
+        belief = replace(belief_of([], size_m=4.0), tracks=(seen,), stamp_ns=round(k * PERIOD_S * 1e9))
+        result = shield.filter(command_of(BodyTwist()), belief, reachable_from(BodyTwist(), DIFFERENTIAL, PERIOD_S))
+    assert result.diagnostics.asked_feasible
+
+
 def test_a_shield_that_takes_over_knows_how_he_came():
     first, second = shield_of(), shield_of()
     after_he_came(first, came_m=0.6, rested_s=0.3)
