@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
@@ -17,13 +15,11 @@ from planners.planner import no_path
 from planners.polyline import arc_length, resample
 from planners.router import Route, RouterSetup, goal_yaw
 from planners.routers.grid_costs import CostGrid, GridCosts, cost_grid
-from planners.routers.grid_graph import GridGraph, trace
 from planners.routers.grid_kernels import near_cells, pull_straight
+from planners.routers.grid_search import cheapest, way_to
 from planners.routers.window import around, remainder_outside, ring
 
 F64 = NDArray[np.float64]
-
-graph_of = lru_cache(maxsize=4)(GridGraph)  # a rolling window alternates between few shapes
 
 
 class GridRouter:
@@ -47,7 +43,7 @@ class GridRouter:
 
     def warm_up(self) -> None:
         """Compile the kernels."""
-        GridGraph(2, 2, 1.0).search(np.ones((2, 2)), 0)
+        way_to((1, 1), cheapest(np.ones((2, 2)), (0, 0), 1.0), np.ones((2, 2)), 1.0)
         pull_straight(np.zeros((2, 2)), np.ones((2, 2)))
         near_cells(np.zeros(1, np.int64), np.zeros(1, np.int64), 1, 2, 2)
         static_field.warm_up(frozen_array(np.zeros((2, 2), np.uint8)))
@@ -80,14 +76,13 @@ class GridRouter:
         (start_row,), (start_column,) = lattice.cell_of(robot[None])
         if not (0 <= start_row < lattice.rows and 0 <= start_column < lattice.columns):
             return no_path(), 0.0
-        graph = graph_of(lattice.rows, lattice.columns, lattice.cell_m)
-        distance, predecessor = graph.search(self._with_loyalty(grid), int(start_row * lattice.columns + start_column))
+        cost = self._with_loyalty(grid)
+        distance = cheapest(cost, (start_row, start_column), lattice.cell_m)
         target, remainder_m = _choose_target(lattice, distance, goal, max(wanted.tolerance_m, lattice.cell_m))
         straight_m = float(np.hypot(*(goal - robot)))
         if not distance[target] + remainder_m <= straight_m + self._settings.detour_limit_m:
             return no_path(), 0.0
-        nodes = np.array(trace(predecessor, target))
-        cells = np.stack((nodes % lattice.columns, nodes // lattice.columns), axis=1).astype(np.float64)
+        cells = way_to(target, distance, cost, lattice.cell_m)[:, ::-1].astype(np.float64)
         path = np.array([lattice.x_m, lattice.y_m]) + (pull_straight(cells, grid.cost) + 0.5) * lattice.cell_m
         path[0] = robot
         if remainder_m < lattice.cell_m:  # the goal's own cell
@@ -105,24 +100,23 @@ class GridRouter:
         return np.where(near, grid.cost * (1.0 - self._settings.loyalty), grid.cost)
 
 
-def _choose_target(lattice: Lattice, distance: F64, goal: F64, tolerance_m: float) -> tuple[int, float]:
-    """Return the node to go to and what remains from there [m]; the node's distance is infinite when there is none."""
+def _choose_target(lattice: Lattice, distance: F64, goal: F64, tolerance_m: float) -> tuple[tuple[int, int], float]:
+    """Return the cell to go to and what remains from there [m]; its distance is infinite when there is none."""
     (row,), (column,) = lattice.cell_of(goal[None])
     if 0 <= row < lattice.rows and 0 <= column < lattice.columns:
         return _nearest_to(lattice, distance, goal, tolerance_m)
     rows, columns, side = ring(lattice.rows, lattice.columns)
     border = lattice.centres(rows, columns)
     low, high = lattice.centres(np.array([0, lattice.rows - 1]), np.array([0, lattice.columns - 1]))
-    nodes = rows * lattice.columns + columns
     remainder = remainder_outside(border, side, low, high, goal)
-    best = int(np.argmin(distance[nodes] + remainder))
-    return int(nodes[best]), float(remainder[best])
+    best = int(np.argmin(distance[rows, columns] + remainder))
+    return (int(rows[best]), int(columns[best])), float(remainder[best])
 
 
-def _nearest_to(lattice: Lattice, distance: F64, goal: F64, tolerance_m: float) -> tuple[int, float]:
-    """Return, of the nodes within the tolerance of the goal that can be reached, the nearest, and what remains from there [m]."""
+def _nearest_to(lattice: Lattice, distance: F64, goal: F64, tolerance_m: float) -> tuple[tuple[int, int], float]:
+    """Return, of the cells within the tolerance of the goal that can be reached, the nearest, and what remains from there [m]."""
     rows, columns, remainder = around(lattice, goal, tolerance_m)
-    nodes, remainder = (rows * lattice.columns + columns).ravel(), remainder.ravel()
-    eligible = np.isfinite(distance[nodes]) & (remainder <= tolerance_m)
-    best = int(np.argmin(np.where(eligible, remainder, np.inf)))
-    return int(nodes[best]), float(remainder[best]) if eligible[best] else np.inf
+    eligible = np.isfinite(distance[rows, columns]) & (remainder <= tolerance_m)
+    row, column = np.unravel_index(np.argmin(np.where(eligible, remainder, np.inf)), remainder.shape)
+    cell = int(rows[row, 0]), int(columns[column])
+    return cell, float(remainder[row, column]) if eligible[row, column] else np.inf

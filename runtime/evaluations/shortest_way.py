@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.polyline import arc_length
-from planners.routers.grid import graph_of
-from planners.routers.grid_graph import trace
 from planners.routers.grid_kernels import pull_straight
+from planners.routers.grid_search import cheapest, way_to
 from runtime.floor_plan import FloorPlan
 from sim_drivers.scene import Scene
 
@@ -45,7 +44,6 @@ class _Free:
         self._cost = np.ones((rows, columns))
         for (x, y, bounding_m), solid in zip(reaches.tolist(), solids, strict=True):
             self._block(FloorPlan((solid,)), np.array([x, y]), bounding_m + radius_m, radius_m)
-        self._graph = graph_of(rows, columns, CELL_M)
 
     def _block(self, plan: FloorPlan, middle: F64, within_m: float, radius_m: float) -> None:
         """Block the places that are too near to one solid, all of which lie within a square around its middle."""
@@ -56,14 +54,13 @@ class _Free:
         self._cost[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1][near] = np.inf
 
     def way_m(self, start: tuple[float, float], goal: tuple[float, float]) -> float:
-        here, there = self._node(start), self._node(goal)
-        distance, predecessor = self._graph.search(self._cost, here)
+        here, there = self._cell(start), self._cell(goal)
+        distance = cheapest(self._cost, here, CELL_M)
         if not math.isfinite(distance[there]):
             return math.inf
-        nodes, columns = np.array(trace(predecessor, there)), self._cost.shape[1]
-        cells = np.stack((nodes % columns, nodes // columns), axis=1).astype(np.float64)
+        cells = way_to(there, distance, self._cost, CELL_M)[:, ::-1].astype(np.float64)
         return float(arc_length(pull_straight(cells, self._cost))[-1]) * CELL_M
 
-    def _node(self, place: tuple[float, float]) -> int:
+    def _cell(self, place: tuple[float, float]) -> tuple[int, int]:
         column, row = np.rint((np.array(place) - self._corner) / CELL_M).astype(int).tolist()
-        return int(row * self._cost.shape[1] + column)
+        return row, column

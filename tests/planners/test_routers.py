@@ -10,8 +10,8 @@ from estimators.belief import UNKNOWN, Lattice
 from planners.polyline import arc_length
 from planners.router import RouterSetup
 from planners.routers.grid import GridRouter
-from planners.routers.grid_graph import GridGraph, trace
 from planners.routers.grid_kernels import pull_straight, segment_cost
+from planners.routers.grid_search import cheapest, way_to
 from planners.routers.straight import StraightRouter
 from planners.routers.window import around, remainder_outside, ring
 from tests.planners.synthetic import Box, Disc, belief_of, mission_to
@@ -49,12 +49,17 @@ def test_search_agrees_with_plain_relaxation(seed):
     cost = rng.uniform(1.0, 5.0, (rows, columns))
     cost[rng.random(cost.shape) < 0.3] = np.inf
     cost[0, 0] = 1.0
-    distance, predecessor = GridGraph(rows, columns, 0.1).search(cost, 0)
-    assert distance.reshape(cost.shape) == pytest.approx(relaxed_until_still(cost, (0, 0)))
-    reachable = np.flatnonzero(np.isfinite(distance))
-    path = trace(predecessor, int(reachable[-1]))
-    assert path[0] == 0
-    assert all(max(abs(a // columns - b // columns), abs(a % columns - b % columns)) == 1 for a, b in itertools.pairwise(path))
+    reached = cheapest(cost, (0, 0), 0.1)
+    assert reached == pytest.approx(relaxed_until_still(cost, (0, 0)))
+    target = tuple(np.argwhere(np.isfinite(reached))[-1].tolist())
+    path = way_to(target, reached, cost, 0.1)
+    assert tuple(path[0]) == (0, 0)
+    assert tuple(path[-1]) == target
+    steps = np.diff(path, axis=0)
+    assert (np.abs(steps).max(axis=1) == 1).all()
+    prices = cost[tuple(path.T)]
+    total = np.sum(0.1 * np.hypot(*steps.T) * 0.5 * (prices[:-1] + prices[1:]))
+    assert total == pytest.approx(reached[target])
 
 
 @pytest.mark.parametrize("seed", range(30))
@@ -99,9 +104,8 @@ def test_cells_around_a_point_are_all_that_are_within_reach(point):
 def test_pulling_straight_never_costs_more_and_keeps_the_ends():
     rng = np.random.default_rng(1)
     cost = rng.uniform(1.0, 3.0, (30, 30))
-    distance, predecessor = GridGraph(30, 30, 1.0).search(cost, 0)
-    nodes = np.array(trace(predecessor, 899))
-    staircase = np.stack((nodes % 30, nodes // 30), axis=1).astype(float)
+    reached = cheapest(cost, (0, 0), 1.0)
+    staircase = way_to((29, 29), reached, cost, 1.0)[:, ::-1].astype(float)
     pulled = pull_straight(staircase, cost)
 
     def total(path):
@@ -110,7 +114,7 @@ def test_pulling_straight_never_costs_more_and_keeps_the_ends():
     assert pulled[0].tolist() == [0.0, 0.0]
     assert pulled[-1].tolist() == [29.0, 29.0]
     assert total(pulled) <= total(staircase) + 1e-6
-    assert np.isfinite(distance).all()
+    assert np.isfinite(reached).all()
 
 
 @pytest.mark.parametrize("falling", [False, True])
