@@ -19,6 +19,7 @@ Triple = tuple[float, float, float]  # numba keeps tuples in registers, arrays n
 
 # The values of mujoco.mjtGeom.
 PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = 0, 2, 3, 4, 5, 6
+_SLACK_M = 1e-6  # by which a sphere around a solid is larger than need be, so that rounding loses no ray
 _TINY = 1e-15  # MuJoCo's mjMINVAL: a direction shorter than this is parallel
 
 
@@ -136,13 +137,17 @@ def cast_rays(
     ranges[:] = np.inf
     for i in range(len(kinds)):
         offset = centres[i] - origin
-        if kinds[i] != PLANE and np.sqrt(np.sum(offset**2)) - np.sqrt(np.sum(extents[i] ** 2)) > far:
+        bounded, away_squared, reach = kinds[i] != PLANE, np.sum(offset**2), np.sqrt(np.sum(extents[i] ** 2)) + _SLACK_M
+        if bounded and np.sqrt(away_squared) - reach > far:
             continue
         r = rotations[i]
         o = -(np.ascontiguousarray(r.T) @ offset)
         local, size = (o[0], o[1], o[2]), (sizes[i, 0], sizes[i, 1], sizes[i, 2])
         for ray in range(len(directions)):
             d = directions[ray]
+            along = offset[0] * d[0] + offset[1] * d[1] + offset[2] * d[2]
+            if bounded and (along < -reach or away_squared - along * along > reach * reach):
+                continue  # it passes the sphere around the solid
             dx = r[0, 0] * d[0] + r[1, 0] * d[1] + r[2, 0] * d[2]
             dy = r[0, 1] * d[0] + r[1, 1] * d[1] + r[2, 1] * d[2]
             dz = r[0, 2] * d[0] + r[1, 2] * d[1] + r[2, 2] * d[2]
