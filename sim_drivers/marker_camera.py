@@ -60,7 +60,7 @@ class SimMarkerCamera(SimSensor[MarkerSample]):
         self._settings = settings
         self._intrinsics = intrinsics(settings.width, settings.height, settings.horizontal_fov_deg)
         self._detector = MarkerDetector(settings.dictionary)
-        self._plates: tuple[tuple[int, F64, F64, Print], ...] = ()  # carrier's body; rotation and place on it; picture
+        self._plates: tuple[tuple[int, F64, F64, Print], ...] = ()  # carrier's geom; rotation and place on it; picture
         self._base_id = 0
         self._caster: RayCaster | None = None
 
@@ -78,11 +78,11 @@ class SimMarkerCamera(SimSensor[MarkerSample]):
         plates = []
         for plate in world.scene.markers:
             try:
-                body = world.model.body(plate.carrier).id
+                geom = world.model.geom(plate.carrier).id
             except KeyError as error:
                 raise ConfigurationError(f"marker {plate.identity} sticks on '{plate.carrier}', which the scene lacks") from error
             place = plate.carrier_from_marker
-            plates.append((body, place.rotation, place.translation, print_of(plate)))
+            plates.append((geom, place.rotation, place.translation, print_of(plate)))
         self._plates = tuple(plates)
         self._measure(world, Stamp(0, 0, 0))
 
@@ -99,9 +99,9 @@ class SimMarkerCamera(SimSensor[MarkerSample]):
         rotation = base_rotation @ mount.rotation  # map from the optical frame
         depth_m = self._caster.depth_image(data, position, rotation, k, FAR_M)
         image = np.full((k.height, k.width), BACKGROUND, dtype=np.float32)
-        for body, turned, offset, picture in self._plates:
-            carrier = data.xmat[body].reshape(3, 3)
-            place = data.xpos[body] + carrier @ offset - position
+        for geom, turned, offset, picture in self._plates:
+            carrier = data.geom_xmat[geom].reshape(3, 3)
+            place = data.geom_xpos[geom] + carrier @ offset - position
             draw_plate(image, depth_m, picture, rotation.T @ carrier @ turned, rotation.T @ place, k)
         return self._spoilt(image, sequence)
 

@@ -225,10 +225,10 @@ def _yaw_quaternion(yaw: float) -> list[float]:
     return [math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)]
 
 
-def _add_solid(body: Any, name: str, shape: Shape, colour: tuple[float, float, float, float]) -> None:
+def _add_solid(body: Any, name: str, shape: Shape, colour: tuple[float, float, float, float]) -> Any:
     x, y, z = shape.half_extents_m
     box = shape.kind is Kind.BOX
-    body.add_geom(
+    return body.add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_BOX if box else mujoco.mjtGeom.mjGEOM_CYLINDER,
         size=[x, y, z] if box else [x, z, 0.0],
@@ -241,8 +241,8 @@ def _add_solid(body: Any, name: str, shape: Shape, colour: tuple[float, float, f
 def _add_static(spec: Any, obstacle: StaticObstacle) -> None:
     pose = obstacle.map_from_shape
     z = obstacle.base_z_m + obstacle.shape.half_extents_m[2]
-    body = spec.worldbody.add_body(name=obstacle.name, pos=[pose.x, pose.y, z], quat=_yaw_quaternion(pose.yaw))
-    _add_solid(body, obstacle.name, obstacle.shape, (0.7, 0.7, 0.7, 1.0))
+    geom = _add_solid(spec.worldbody, obstacle.name, obstacle.shape, (0.7, 0.7, 0.7, 1.0))
+    geom.pos, geom.quat = [pose.x, pose.y, z], _yaw_quaternion(pose.yaw)
 
 
 def _add_mover(spec: Any, mover: Mover) -> None:
