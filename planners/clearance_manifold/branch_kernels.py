@@ -12,10 +12,6 @@ BODY_M = 0.25  # from the middle of a boundary that closes in to its sides
 NARROW = 5.0  # cost of a station where the shield would stop; less, the nearer it is to ample
 EARLY = 0.7  # of the time to a place: the robot may be there so early
 STEEP = 2.0  # no branch is steeper: from one station to the next it would lead through what stands between them
-COMMITTED_M = 0.1  # so far from the line of who comes the robot has begun to let him pass,
-FAR_M = 0.7  # and so far from it he is nobody's
-ALONG = 0.3  # the share of a velocity that leads across the way of who comes along it, at most
-CROSS, BEGIN = 3.0, 20.0  # cost of a station on the other side of that line, and of the robot's own: it is not there
 AWAY = 4.0  # cost of a squared distance between the robot and its own station, per square metre
 
 
@@ -47,57 +43,6 @@ def encounters(sections: Sections, offsets: F64, robot: F64, speed_m_s: float, h
             t = min(max(nearest, first), horizon_s)
             apart[i, j] = np.hypot(x - closing[0] - closing[2] * t, y - closing[1] - closing[3] * t) - BODY_M
     return apart
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def side_of(robot: F64, normal: F64, horizon_s: float, closing: F64) -> float:
-    """Return how far to his left the robot is off the line of who comes along the way [m], NaN where nobody comes near it.
-
-    Args:
-        robot: in odom, shape (2,).
-        normal: of the way where the robot is, to its left, unit, shape (2,).
-        horizon_s: who comes later does not count.
-        closing: middle, velocity and number of cells of the boundary, shape (5,).
-    """
-    speed2 = closing[2] * closing[2] + closing[3] * closing[3]
-    if closing[4] == 0.0 or speed2 < 0.01:
-        return float(np.nan)
-    x, y, speed = robot[0] - closing[0], robot[1] - closing[1], np.sqrt(speed2)
-    side, time_s = float((y * closing[2] - x * closing[3]) / speed), (x * closing[2] + y * closing[3]) / speed2
-    along = abs(closing[2] * normal[0] + closing[3] * normal[1]) <= ALONG * speed
-    return side if along and abs(side) < FAR_M and 0.0 < time_s < horizon_s else float(np.nan)
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def across(sections: Sections, offsets: F64, robot: F64, speed_m_s: float, horizon_s: float, closing: F64) -> F64:
-    """Return what it costs to change the side of who comes along the way, shape (n, m), where he still comes by.
-
-    Two lanes beside somebody are often as good as each other, and the noise of a clearance would send the robot from one to the
-    other in front of him.  So as soon as it has begun to go to one hand, the other one must be better by that.
-
-    Args:
-        sections: from the robot's own on.
-        offsets: shape (m,).
-        robot: in odom, shape (2,).
-        speed_m_s: the fastest that the robot arrives with.
-        horizon_s: who comes later does not count.
-        closing: middle, velocity and number of cells of the boundary, shape (5,).
-    """
-    cost = np.zeros((len(sections.at), len(offsets)))
-    side = side_of(robot, sections.normal[0], horizon_s, closing)
-    if not abs(side) > COMMITTED_M:  # nobody comes, or it has not begun
-        return cost
-    speed2 = closing[2] * closing[2] + closing[3] * closing[3]
-    left_x, left_y = -closing[3] / np.sqrt(speed2), closing[2] / np.sqrt(speed2)
-    for i in range(len(sections.at)):
-        for j in range(len(offsets)):
-            x = sections.at[i, 0] + offsets[j] * sections.normal[i, 0]
-            y = sections.at[i, 1] + offsets[j] * sections.normal[i, 1]
-            first = EARLY * np.hypot(x - robot[0], y - robot[1]) / speed_m_s if i > 0 else 0.0
-            passes = ((x - closing[0]) * closing[2] + (y - closing[1]) * closing[3]) / speed2
-            if passes > first and side * ((x - closing[0]) * left_x + (y - closing[1]) * left_y) < 0.0:
-                cost[i, j] = CROSS if i > 0 else BEGIN
-    return cost
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

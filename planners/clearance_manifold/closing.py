@@ -38,6 +38,11 @@ class ClosingMemory:
         self._spread: F64 = np.zeros(3)  # variance of its place, covariance with its velocity, and that one's variance
         self._seen_s, self._unseen_s = 0.0, 0.0
 
+    @property
+    def begins(self) -> bool:
+        """Whether what closes in is another than at the time before."""
+        return self._seen_s == 0.0
+
     def update(self, found: F64, field: ClearanceField, age_s: F32, elapsed_s: float) -> F64:
         """Return what closes in: what is seen to, or where what was seen to must be by now; shape (5,).
 

@@ -7,11 +7,6 @@ from numba import njit
 
 from estimators.belief import F64, Mask
 
-STRAIGHT_ON_M = 0.2  # with a miss smaller than this somebody comes straight on
-CROSSING = 0.3  # the share of a velocity that leads across the way of who crosses
-LED_M = 0.2  # a manifold so far aside has chosen where to pass
-CHANGE_M = 0.1  # who turns out to miss by this on the other hand passes there
-
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def brakable(distance_m: float, deceleration_m_s2: float, delay_s: float) -> float:
@@ -89,56 +84,3 @@ def longitudinal(u_x: float, u_y: float, t_x: float, t_y: float, speed: float, c
     elif t_y < -1e-9:
         k = min(k, (-cap_y - u_y) / t_y)
     return max(k, 0.0)
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def give_way(
-    u: F64, robot: F64, closing: F64, apart_m: float, horizon_s: float, side: F64, tangent: F64, hand: float, lead_m: float = 0.0
-) -> tuple[F64, float]:
-    """Return the velocity nearest to u, shape (2,), with which what closes in passes at `apart_m` if it goes on as it does.
-
-    Standing still, the robot would be missed by the signed distance m, across the other's way, after the time t of closest
-    approach; with a velocity across that way of at most (m - apart) / t it is missed by enough: it does not cross in front of
-    who crosses before it.  On which hand he passes is kept while he comes: a miss near zero changes its sign with the noise
-    of the velocity that it follows from.
-
-    Args:
-        u: velocity in odom [m/s].
-        robot: in odom, shape (2,).
-        closing: middle, velocity and number of cells of the boundary, shape (5,).
-        apart_m: between the middle and the robot's centre.
-        horizon_s: later encounters do not count.
-        side: where the manifold leads to, shape (2,), unit: the robot goes there when somebody comes straight on along the way.
-        tangent: of the way, shape (2,), unit; behind who comes straight on across it, the robot passes.
-        lead_m: how far the manifold is to that side: where it has gone aside, the robot goes there for who comes along the way.
-        hand: on which he passes at the tick before, seen along his way: 1 left of the robot, -1 right of it; 0: nobody came.
-
-    Returns:
-        The velocity, and the hand on which he passes now.
-    """
-    speed2 = closing[2] * closing[2] + closing[3] * closing[3]
-    if closing[4] == 0.0 or speed2 < 0.01:
-        return u, 0.0
-    x, y = closing[0] - robot[0], closing[1] - robot[1]
-    t = -(x * closing[2] + y * closing[3]) / speed2
-    if not 0.0 < t < horizon_s:
-        return u, 0.0
-    speed = np.sqrt(speed2)
-    left_x, left_y = -closing[3] / speed, closing[2] / speed
-    miss = x * left_x + y * left_y  # what is along his way is over at t
-    across = tangent[0] * closing[3] - tangent[1] * closing[2]  # his speed to the left, across the way
-    if lead_m > LED_M and abs(miss) < apart_m and abs(across) <= CROSSING * speed:
-        hand = -1.0 if side[0] * left_x + side[1] * left_y > 0.0 else 1.0
-    elif hand == 0.0 and abs(miss) < STRAIGHT_ON_M:
-        if abs(across) > CROSSING * speed:
-            behind = across * (tangent[0] * left_y - tangent[1] * left_x)
-            hand = 1.0 if behind > 0.0 else -1.0
-        else:
-            hand = -1.0 if side[0] * left_x + side[1] * left_y > 0.0 else 1.0
-    elif hand == 0.0 or hand * miss < -CHANGE_M:
-        hand = 1.0 if miss > 0.0 else -1.0
-    n_x, n_y = hand * left_x, hand * left_y
-    excess = u[0] * n_x + u[1] * n_y - (hand * miss - apart_m) / max(t, 0.5)
-    if excess <= 0.0:
-        return u, hand
-    return np.array([u[0] - excess * n_x, u[1] - excess * n_y]), hand

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from drivers.interface.commands import BaseLimits, BodyTwist
 from drivers.interface.geometry import SE2, wrap_angle
 from estimators.belief import F64
-from planners.clearance_manifold.control_kernels import brakable, give_way, known_way, longitudinal
+from planners.clearance_manifold.control_kernels import brakable, known_way, longitudinal
 from planners.clearance_manifold.differential import Differential
 from planners.clearance_manifold.governor import Around, Governor, Motion, approach
 from planners.clearance_manifold.governor_kernels import room_along, time_to_pass
+from planners.clearance_manifold.passing_kernels import give_way
 from planners.clearance_manifold.settings import ControllerSettings
 from planners.point_ds.kernels import within
 
@@ -43,7 +44,8 @@ class Situation:
     feasible: bool
     robot: F64  # (2,), the point that is controlled, in odom
     velocity: F64  # (2,), of the base, in odom
-    closing: F64  # (5,), what closes in
+    closing: F64  # (5,), what closes in,
+    hand: float  # and on which hand it passes (`Passing`)
     behind_m: float = 0.0  # how far a base that cannot strafe may back off
     stale: bool = False  # nobody has looked at the ground right before it for long
 
@@ -55,9 +57,8 @@ class ManifoldController:
         """Take gains, limits and radius, and what smooths the velocity, which is carried on with this one's state."""
         self._settings, self._limits, self._governor = settings, limits, governor
         self._differential = Differential(settings, limits)
-        self._apart_m = radius_m + settings.yield_m if settings.yield_m > 0.0 else 0.0
+        self.apart_m = radius_m + settings.yield_m if settings.yield_m > 0.0 else 0.0
         self._radius_m = radius_m
-        self._hand = 0.0  # on which who comes passes
         self._delay_s = settings.delay_s
         if limits.holonomic and governor.enabled:  # braking begins with a ramp
             self._delay_s += 0.5 * settings.deceleration_m_s2 / governor.ease_m_s3
@@ -123,27 +124,18 @@ class ManifoldController:
 
     def _yielding(self, u: F64, at: Situation) -> F64:
         """Return the velocity, shape (2,), in odom, changed so that what closes in passes at a distance."""
-        s = self._settings
-        error_m = float(np.hypot(*at.error))
-        side = -at.error / error_m if error_m > 1e-6 else np.array([-at.tangent[1], at.tangent[0]])
-        yielding: F64
-        yielding, self._hand = give_way(
-            u, at.robot, at.closing, self._apart_m, s.yield_horizon_s, side, at.tangent, self._hand, error_m
-        )
-        return yielding
+        return np.asarray(give_way(u, at.robot, at.closing, self.apart_m, self._settings.yield_horizon_s, at.hand))
 
     def reset(self) -> None:
-        """Stand, with nobody coming."""
-        self._hand = 0.0
+        """Stand."""
         self._governor.reset()
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Return what is carried on, as named arrays."""
-        return {"hand": np.array(self._hand), **self._governor.state()}
+        return self._governor.state()
 
     def take(self, state: dict[str, NDArray[Any]]) -> None:
         """Take over what `state` gave."""
-        self._hand = float(state["hand"])
         self._governor.take(state)
 
     def _over_known_ground(self, u: F64, at: Situation, around: Around) -> F64:

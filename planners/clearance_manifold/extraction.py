@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimators.belief import F64
-from planners.clearance_manifold.branch_kernels import across, cheapest_branch, cost_along, encounters, station_costs
+from planners.clearance_manifold.branch_kernels import cheapest_branch, cost_along, encounters, station_costs
 from planners.clearance_manifold.manifold import Manifold, Stations, points_of
 from planners.clearance_manifold.offset_qp import FAR_M, OffsetProgram
 from planners.clearance_manifold.ridge_kernels import (
@@ -27,7 +27,6 @@ CURVATURE_LENGTH_M = 0.5  # at which curvature costs as much as slope
 CENTRING = 0.05
 TURN = 1.5
 ENCOUNTER_S = 3.0  # how far ahead a side is chosen for
-SIDE_S = 6.0  # and how far ahead one that was chosen is kept: from where who walks slowly comes into view
 LIKING = 0.3
 
 
@@ -61,6 +60,7 @@ class Solver:
         """Set both programs up."""
         s, period_s = settings, setup.period_s
         self._settings, self._tracker, self._stations = settings, tracker, stations
+        self.own = stations.own
         self.least_m = setup.robot_radius_m + s.margin_m
         kept_m = max(self.least_m, setup.kept_clear_m)
         ample_m = kept_m + s.ample_m
@@ -82,11 +82,7 @@ class Solver:
             scene: what it is laid through.
             liked: offsets followed so far, shape (n,), NaN where there are none; they are preferred.
         """
-        own = self._stations.own
-        ahead = Sections(*(part[own : scene.end] for part in scene.sections))
-        apart = encounters(ahead, self._offsets, scene.robot, scene.speed_m_s, ENCOUNTER_S, scene.closing)
-        costs = station_costs(profiles(scene.ground, ahead, self._offsets), apart, self._offsets, self._demand)
-        costs += across(ahead, self._offsets, scene.robot, scene.speed_m_s, SIDE_S, scene.closing)
+        own, costs = self._stations.own, self._costs(scene)
         if liked is not None:
             wanted = liked[own : scene.end, None]
             costs += np.where(np.isfinite(wanted), LIKING * np.abs(self._offsets - wanted), 0.0)
@@ -97,6 +93,17 @@ class Solver:
             return np.concatenate((y, beyond)), 0.0
         now = cost_along(costs, self._offsets, spacing, scene.robot_m, TURN, liked[own : scene.end])
         return np.concatenate((y, beyond)), (now - least) / len(y)
+
+    def _costs(self, scene: Scene) -> F64:
+        """Return the costs of all stations ahead and offsets, shape (n, m)."""
+        ahead = Sections(*(part[self._stations.own : scene.end] for part in scene.sections))
+        apart = encounters(ahead, self._offsets, scene.robot, scene.speed_m_s, ENCOUNTER_S, scene.closing)
+        return np.asarray(station_costs(profiles(scene.ground, ahead, self._offsets), apart, self._offsets, self._demand))
+
+    def pays(self, scene: Scene) -> float:
+        """Return what the best branch costs per station, whatever was followed so far [m]."""
+        costs = self._costs(scene)
+        return float(cheapest_branch(costs, self._offsets, self._spacing[: len(costs) - 1], scene.robot_m, TURN)[1]) / len(costs)
 
     def extract(self, scene: Scene, prior: Prior | None) -> Manifold:
         """Return the manifold of the two-stage solver; with a prior, the branch followed so far is preferred."""

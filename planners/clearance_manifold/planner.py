@@ -17,17 +17,17 @@ from drivers.interface.geometry import SE2
 from drivers.interface.stateful import pack, unpack
 from estimators.belief import F64, Belief
 from estimators.field_query import sample
-from planners.clearance_manifold.branch_kernels import side_of
 from planners.clearance_manifold.chart import Chart, lay_chart
 from planners.clearance_manifold.control_kernels import brakable
 from planners.clearance_manifold.controller import ManifoldController, Situation
 from planners.clearance_manifold.diagnostics import ManifoldDiagnostics, diagnose
 from planners.clearance_manifold.drawings import drawn
-from planners.clearance_manifold.extraction import SIDE_S, Scene, Solver
+from planners.clearance_manifold.extraction import Scene, Solver
 from planners.clearance_manifold.governor import Around, Governor
 from planners.clearance_manifold.lookout import Lookout, Outlook
 from planners.clearance_manifold.lookout_kernels import Seen
 from planners.clearance_manifold.manifold import Stations
+from planners.clearance_manifold.passing import Passing, meets
 from planners.clearance_manifold.prediction import ArrivalField, Predicted
 from planners.clearance_manifold.properties import check
 from planners.clearance_manifold.reading import Reader
@@ -66,6 +66,7 @@ class ClearanceManifold:
         self._lookout = Lookout(settings.lookout, setup.limits, setup.robot_radius_m, settings.controller.speed_m_s)
         self._governor = Governor(settings.smoothness, setup.limits, setup.period_s)
         self._controller = ManifoldController(settings.controller, setup.limits, self._governor, setup.robot_radius_m)
+        self._passing = Passing(self._solver, self._controller.apart_m, settings.controller.speed_m_s)
         self._waiting = Waiting(settings.waiting, setup.limits.velocity.wz)
         self._chart: Chart | None = None
         self._arc_m = 0.0  # of the robot on the chart
@@ -74,6 +75,7 @@ class ClearanceManifold:
     def warm_up(self) -> None:
         """Compile every kernel, on a scene of its own."""
         self._field.warm_up()
+        self._passing.warm_up()
         type(self)(self._settings, self._setup)._governor.warm_up()
         rehearse(type(self)(self._settings, self._setup))
 
@@ -89,10 +91,13 @@ class ClearanceManifold:
         new_goal = self._follow_route(route, point, predicted.closing)
         assert self._chart is not None
         scene = self._scene(self._chart, predicted, belief, point)
+        hand, scene = self._passing.update(scene, _velocity(belief), begins=predicted.begins)
         told = self._tracker.advance(scene, belief, new_goal)
         outlook = self._outlook(scene, told, belief)
         left_m = self._chart.length_m - self._arc_m
-        situation = self._reader.situation(told.manifold, belief, point, left_m, predicted.closing, outlook, self._field.met_s)
+        situation = self._reader.situation(
+            told.manifold, belief, point, left_m, predicted.closing, hand, outlook, self._field.met_s
+        )
         around = Around(scene.ground, belief.clearance.known, self._solver.least_m, self._settings.controller.body_m)
         twist, speed = self._controller.command(situation, pose.yaw, around)
         return self._plan(scene, told, situation, outlook, (twist, speed))
@@ -100,6 +105,7 @@ class ClearanceManifold:
     def _wait(self, belief: Belief, reason: str, *, blocked: bool) -> Plan:
         """Stand; where the way is blocked, look whether it still is."""
         self._tracker.reset()
+        self._passing.reset()
         self._lookout.reset()
         self._controller.reset()
         diagnostics = ManifoldDiagnostics(fallback_category="", stopped=reason)
@@ -137,8 +143,7 @@ class ClearanceManifold:
         if self._chart is not None and moved_m < self._settings.chart.escape_m:
             self._arc_m = float(self._chart.project(point[None], self._arc_m)[0, 0])
             normal = self._chart.frames(np.array([self._arc_m]), 1.0)[1][0]
-            met = math.isfinite(side_of(point, normal, SIDE_S, closing))
-            if moved_m < 0.05 and (met or not self._escapes(self._chart, route.path_in_odom)):
+            if moved_m < 0.05 and (meets(point, normal, closing) or not self._escapes(self._chart, route.path_in_odom)):
                 return False
         behind = self._behind(point, route.path_in_odom)
         self._chart = lay_chart(route.path_in_odom, goal, behind, self._settings.chart)
@@ -200,8 +205,7 @@ class ClearanceManifold:
         way = at + np.interp(arcs_m, scene.arcs_m, told.manifold.offset_m)[:, None] * normal
         lattice = field.lattice
         seen = Seen(field.known, field.clearance_m, self._field.age_s, lattice.x_m, lattice.y_m, lattice.cell_m)
-        velocity = SE2(0.0, 0.0, belief.odom_from_base.yaw).apply(np.array([belief.twist.vx, belief.twist.vy]))
-        along_m_s = max(0.0, float(velocity @ told.manifold.tangent()))
+        along_m_s = max(0.0, float(_velocity(belief) @ told.manifold.tangent()))
         return self._lookout.watch(seen, way, normal, along_m_s, self._setup.period_s)
 
     def _plan(self, scene: Scene, told: Continuation, at: Situation, outlook: Outlook, command: tuple[BodyTwist, float]) -> Plan:
@@ -227,6 +231,7 @@ class ClearanceManifold:
             ticks=self._ticks,
             **self._field.state(),
             **self._tracker.state(),
+            **self._passing.state(),
             **self._waiting.state(),
             **self._lookout.state(),
             **self._controller.state(),
@@ -239,6 +244,12 @@ class ClearanceManifold:
         self._arc_m, self._ticks = float(state["arc_m"]), state["ticks"]
         self._field.take(state)
         self._tracker.take(state)
+        self._passing.take(state)
         self._waiting.take(state)
         self._lookout.take(state)
         self._controller.take(state)
+
+
+def _velocity(belief: Belief) -> F64:
+    """Return the base's velocity, shape (2,), in odom [m/s]."""
+    return np.asarray(SE2(0.0, 0.0, belief.odom_from_base.yaw).apply(np.array([belief.twist.vx, belief.twist.vy])))

@@ -29,7 +29,8 @@ class Predicted:
     """The field on arrival."""
 
     clearance_m: F32  # (rows, columns), Gamma_pred
-    closing: F64  # (5,), of what closes in: middle in odom [m], velocity [m/s], number of cells, 0 where nothing does
+    closing: F64  # (5,), of what closes in: middle in odom [m], velocity [m/s], number of cells, 0 where nothing does,
+    begins: bool  # and whether it is another than before
 
 
 class ArrivalField:
@@ -67,7 +68,7 @@ class ArrivalField:
         if closing[4] < LEAST_CELLS:
             closing[4] = 0.0
         closing = self._closing.update(closing, field, self._met_s, elapsed_s)
-        return Predicted(lowered(field.clearance_m, taken, cell_m), closing)
+        return Predicted(lowered(field.clearance_m, taken, cell_m), closing, self._closing.begins)
 
     @property
     def age_s(self) -> F32:

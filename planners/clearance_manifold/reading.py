@@ -30,7 +30,15 @@ class Reader:
         self._settings, self._stations, self._least_m, self._strafes = settings, stations, least_m, strafes
 
     def situation(
-        self, manifold: Manifold, belief: Belief, point: F64, left_m: float, closing: F64, outlook: Outlook, met_s: F32
+        self,
+        manifold: Manifold,
+        belief: Belief,
+        point: F64,
+        left_m: float,
+        closing: F64,
+        hand: float,
+        outlook: Outlook,
+        met_s: F32,
     ) -> Situation:
         """Return what the controller needs.
 
@@ -40,6 +48,7 @@ class Reader:
             point: that follows it, in odom, shape (2,).
             left_m: to the end of the chart, the goal.
             closing: what closes in, shape (5,).
+            hand: on which it passes.
             outlook: what unseen walkers leave of the way.
             met_s: how long ago each cell was looked at, shape (rows, columns).
         """
@@ -67,6 +76,7 @@ class Reader:
             robot=point,
             velocity=SE2(0.0, 0.0, belief.odom_from_base.yaw).apply(np.array([belief.twist.vx, belief.twist.vy])),
             closing=closing,
+            hand=hand,
             behind_m=0.0 if self._strafes else self._behind(belief),
             stale=stale,
         )

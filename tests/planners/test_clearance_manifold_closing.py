@@ -5,8 +5,8 @@ import pytest
 
 from drivers.interface.geometry import SE2
 from estimators.belief import ClearanceField, Lattice
-from planners.clearance_manifold.branch_kernels import BEGIN, BODY_M, CROSS, FAR_M, across, encounters, side_of
-from planners.clearance_manifold.control_kernels import give_way, known_way
+from planners.clearance_manifold.branch_kernels import BODY_M, encounters
+from planners.clearance_manifold.control_kernels import known_way
 from planners.clearance_manifold.recent_rate import WINDOW_S, RecentRate
 from planners.clearance_manifold.ridge_kernels import Sections
 
@@ -74,40 +74,6 @@ def test_beyond_the_horizon_he_counts_where_he_is_by_then():
     assert apart == pytest.approx(OFFSETS + 1.5 - BODY_M)
 
 
-@pytest.mark.parametrize("side", [1.0, -1.0])
-@pytest.mark.parametrize(("begun_m", "kept"), [(0.05, False), (0.3, True), (1.2, False)])
-def test_who_has_begun_to_let_somebody_pass_keeps_to_that_side_of_his_line_until_he_is_past(side, begun_m, kept):
-    """He comes along y = 0 at 0.6 m/s from 2 m ahead; the robot has begun to go to one side, or not, or is far from him."""
-    sections = sections_at([0.0, 0.5, 1.8])
-    cost = across(sections, OFFSETS, np.array([0.0, begun_m * side]), 0.4, 6.0, np.array([2.0, 0.0, -0.6, 0.0, 20.0]))
-    other = OFFSETS * side < 0.0
-    assert cost[0] == pytest.approx(np.where(other & kept, BEGIN, 0.0))  # it is not there
-    assert cost[1] == pytest.approx(np.where(other & kept, CROSS, 0.0))
-    assert not cost[:, ~other].any()
-    assert not cost[2].any()  # he is past there before the robot can be
-    assert not across(sections, OFFSETS, np.array([0.0, begun_m * side]), 0.4, 6.0, np.array([-2.0, 0.0, -0.6, 0.0, 20.0])).any()
-    crossing = np.array([1.0, -1.0, -0.4, 0.4, 20.0])
-    assert not across(sections, OFFSETS, np.array([0.0, begun_m * side]), 0.4, 6.0, crossing).any()
-
-
-@pytest.mark.parametrize("yaw", [0.0, 0.7, -2.5])
-def test_of_who_comes_along_the_way_it_is_known_on_which_side_the_robot_is(yaw):
-    """He comes from 2 m ahead at 0.6 m/s; his left is the robot's right."""
-    turned = SE2(0.0, 0.0, yaw)
-    normal = turned.apply(np.array([0.0, 1.0]))
-
-    def side(aside_m, place=(2.0, 0.0), velocity=(-0.6, 0.0), cells=20.0, horizon_s=6.0):
-        closing = np.concatenate((turned.apply(np.array(place)), turned.apply(np.array(velocity)), (cells,)))
-        return side_of(turned.apply(np.array([0.0, aside_m])), normal, horizon_s, closing)
-
-    assert [side(aside_m) for aside_m in (0.3, 0.0, -0.3)] == pytest.approx([-0.3, 0.0, 0.3])
-    assert np.isnan(side(FAR_M + 0.01))  # he is nobody's
-    assert np.isnan(side(0.0, velocity=(0.6, 0.0)))  # he goes away
-    assert np.isnan(side(0.0, place=(2.0, -2.0), velocity=(-0.6, 0.6)))  # he crosses
-    assert np.isnan(side(0.0, horizon_s=3.0))  # that is not soon
-    assert np.isnan(side(0.0, cells=0.0))  # there is nobody
-
-
 @pytest.mark.parametrize("yaw", [0.0, 0.7, -2.5])
 def test_the_known_way_ends_before_the_body_meets_what_was_never_seen(yaw):
     known = np.ones((80, 80), np.bool_)
@@ -118,16 +84,3 @@ def test_the_known_way_ends_before_the_body_meets_what_was_never_seen(yaw):
     free_m = known_way(known, corner, CELL_M, robot, along, 0.12, 0.25, 0.15, 0.6)
     assert free_m == pytest.approx(0.3, abs=0.05)
     assert known_way(known, corner, CELL_M, robot, -along, 0.12, 0.25, 0.15, 0.6) == pytest.approx(0.6, abs=0.01)
-
-
-@pytest.mark.parametrize("side", [1.0, -1.0])
-def test_where_the_manifold_has_gone_aside_the_robot_goes_there_for_who_comes_along_the_way(side):
-    """He comes straight on; he was taken to pass on the manifold's side, and the robot had begun to go to the other."""
-    closing, tangent = np.array([2.0, 0.02 * side, -1.0, 0.0, 40.0]), np.array([1.0, 0.0])
-    towards, nobody = np.array([0.0, side]), np.zeros(2)
-    led, hand = give_way(nobody, nobody, closing, 0.6, 2.5, towards, tangent, 0.0, 0.5)
-    again, _ = give_way(nobody, nobody, closing, 0.6, 2.5, towards, tangent, -hand, 0.5)
-    stuck, _ = give_way(nobody, nobody, closing, 0.6, 2.5, towards, tangent, -hand, 0.0)
-    assert led[1] * side > 0.2
-    assert again == pytest.approx(led)
-    assert stuck[1] * side < -0.2  # what led in front of him

@@ -6,7 +6,6 @@ import pytest
 from drivers.interface.commands import BodyTwist
 from drivers.interface.geometry import SE2
 from planners.clearance_manifold.closing import ClosingMemory
-from planners.clearance_manifold.control_kernels import give_way
 from planners.clearance_manifold.drift import Drift, Past
 from planners.clearance_manifold.governor import Around, Governor, Motion, approach
 from planners.clearance_manifold.governor_kernels import followed, jerk_to_move, jerk_to_pass, jerk_to_stop, room_along
@@ -17,8 +16,6 @@ from planners.planner import PlannerSetup
 from planners.router import RouterSetup
 from planners.routers.straight import StraightRouter
 from tests.planners.synthetic import OMNI, Box, belief_of, mission_to
-
-NOBODY, AHEAD = np.zeros(5), np.array([1.0, 0.0])
 
 
 def driven(wanted, jerk=1.0, dt=0.05, seconds=4.0, velocity=(0.0, 0.0)):
@@ -118,29 +115,6 @@ def test_the_end_of_a_wall_stops_closing_in_and_a_walker_does_not(speed):
         still, moves = wall.update(ends, field, age, 0.05), walker.update(comes, field, age, 0.05)
     assert np.hypot(*still[2:4]) < 0.45 * speed * np.exp(-0.05 * 11 / 0.56)
     assert moves[3] == pytest.approx(-speed, rel=0.35)
-
-
-def test_the_hand_on_which_somebody_passes_is_kept():
-    """He comes straight on, his velocity noisy: with the hand that was chosen first the robot does not change sides."""
-    robot, side, u = np.zeros(2), np.array([0.0, 1.0]), np.array([0.4, 0.0])
-    chosen, hand = [], 0.0
-    for sway in (0.02, -0.03, 0.04, -0.04):
-        given, hand = give_way(u, robot, np.array([2.0, 0.0, -1.0, sway, 50.0]), 0.6, 2.5, side, AHEAD, hand)
-        chosen.append(given[1] > 0.0)
-    assert chosen == [True] * 4
-    _, hand = give_way(u, robot, np.array([2.0, 0.0, -1.0, 0.3, 50.0]), 0.6, 2.5, side, AHEAD, hand)
-    given, _ = give_way(u, robot, np.array([2.0, 0.0, -1.0, 0.3, 50.0]), 0.6, 2.5, side, AHEAD, hand)
-    assert given[1] < 0.0  # he clearly passes on the left
-    assert give_way(u, robot, NOBODY, 0.6, 2.5, side, AHEAD, hand)[1] == 0.0
-
-
-@pytest.mark.parametrize("left", [1.0, -1.0])
-def test_who_crosses_straight_on_is_passed_behind(left):
-    """He comes obliquely, to meet the robot if it stands: it goes back and to where he comes from, not on in front of him."""
-    closing = np.array([1.0, -left, -0.7, 0.7 * left, 50.0])
-    given, _ = give_way(np.array([0.4, 0.0]), np.zeros(2), closing, 0.6, 2.5, np.array([0.0, left]), AHEAD, 0.0)
-    assert given[0] < 0.2
-    assert left * given[1] < 0.0
 
 
 @pytest.mark.parametrize("period_ms", [20, 50, 200])

@@ -1,0 +1,105 @@
+"""On which hand who comes passes: the one answer that the branch, its boxes and who gives way keep to.
+
+Ours; the paper's field says only that something closes in.  README.md beside this file says why.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.belief import F64
+from planners.clearance_manifold.extraction import Scene, Solver
+from planners.clearance_manifold.passing_kernels import ABREAST_M, left_to, meeting, runs_along
+from planners.clearance_manifold.ridge_kernels import Sections
+
+SIDE_S = 6.0  # so long before he passes a hand is chosen: from where who walks slowly comes into view
+FAR_M = 0.7  # so far from the line of who comes he is nobody's
+GAIN_M = 0.5  # the other hand must be better by this
+BOUND_FOR_S = 0.6  # so long a velocity across the way leads on before the robot could turn back
+STRAIGHT_ON_M = 0.2  # with a miss smaller than this somebody comes straight on
+
+
+class Passing:
+    """Chooses a hand when somebody begins to come, and changes it only while the robot can still get to the other one."""
+
+    def __init__(self, solver: Solver, apart_m: float, speed_m_s: float) -> None:
+        """Take what knows the branches, how far apart who passes is kept, and how fast the robot gets there."""
+        self._solver, self._apart_m, self._speed_m_s = solver, apart_m, speed_m_s
+        self.reset()
+
+    def reset(self) -> None:
+        """Nobody comes."""
+        self._hand = 0.0
+
+    def warm_up(self) -> None:
+        """Compile what a rehearsal in an empty corridor does not call."""
+        sections, closing = (
+            Sections(np.zeros((1, 2)), np.array([[0.0, 1.0]]), np.zeros((1, 2))),
+            np.array([1.0, 0.0, -1.0, 0.0, 1.0]),
+        )
+        meets(np.zeros(2), sections.normal[0], closing)
+        left_to(1.0, sections, 0, np.zeros(2), 1.0, closing, 0.1)
+
+    def update(self, scene: Scene, velocity: F64, *, begins: bool) -> tuple[float, Scene]:
+        """Return the hand on which what closes in passes, and the scene with what that leaves of it.
+
+        The hand is seen along the way of who comes: 1 left of the robot, -1 right of it, 0: nobody comes.
+
+        Args:
+            scene: what a manifold is laid through.
+            velocity: of the base, in odom, shape (2,).
+            begins: whether this is somebody else than at the tick before.
+        """
+        normal = scene.sections.normal[self._solver.own]
+        time_s = meeting(scene.robot, scene.closing)[0]
+        comes = time_s < SIDE_S and time_s * float(np.hypot(*scene.closing[2:4])) > -ABREAST_M
+        if begins or not comes:
+            self._hand = 0.0
+        if not comes:
+            return 0.0, scene
+        along = runs_along(normal, scene.closing)
+        bound_for = scene.robot + BOUND_FOR_S * float(velocity @ normal) * normal
+        miss_m = meeting(bound_for, scene.closing)[1]
+        if self._hand == 0.0 or self._can_change(miss_m, time_s):
+            self._choose(scene, miss_m, along=along)
+        return self._hand, self._beside(scene, self._hand) if along else scene
+
+    def _can_change(self, miss_m: float, time_s: float) -> bool:
+        """Return whether the robot gets to the other hand from where it is bound for before he passes."""
+        return self._apart_m + self._hand * miss_m <= self._speed_m_s * max(0.0, time_s - BOUND_FOR_S)
+
+    def _choose(self, scene: Scene, miss_m: float, *, along: bool) -> None:
+        """Take the hand with the shorter way aside and, of who comes along the way, the better branch."""
+        burdens = {hand: max(0.0, self._apart_m - hand * miss_m) for hand in (-1.0, 1.0)}
+        if along:
+            burdens = {hand: aside_m + self._solver.pays(self._beside(scene, hand)) for hand, aside_m in burdens.items()}
+        elif self._hand == 0.0 and abs(miss_m) < STRAIGHT_ON_M:  # who crosses is passed behind
+            normal, (x, y) = scene.sections.normal[self._solver.own], scene.closing[2:4]
+            burdens = {hand: -hand * float(normal @ (x, y)) * float(normal @ (-y, x)) for hand in burdens}
+        better = min(burdens, key=lambda hand: burdens[hand])
+        if self._hand == 0.0 or burdens[self._hand] - burdens[better] > GAIN_M:
+            self._hand = better
+
+    def _beside(self, scene: Scene, hand: float) -> Scene:
+        """Return what who comes along the way leaves of a scene on the robot's hand of him."""
+        own, least_m = self._solver.own, self._solver.least_m
+        reach = left_to(hand, scene.sections, own, scene.robot, scene.speed_m_s, scene.closing, least_m)
+        return replace(scene, sections=scene.sections._replace(reach=reach))
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """Return what is carried on, as named arrays."""
+        return {"hand": np.array(self._hand)}
+
+    def take(self, state: dict[str, NDArray[Any]]) -> None:
+        """Take over what `state` gave."""
+        self._hand = float(state["hand"])
+
+
+def meets(point: F64, normal: F64, closing: F64) -> bool:
+    """Return whether what closes in, shape (5,), comes along a way with this normal, near to a point on it, shape (2,) each."""
+    time_s, miss_m = meeting(point, closing)
+    return bool(runs_along(normal, closing)) and abs(miss_m) < FAR_M and 0.0 < time_s < SIDE_S
