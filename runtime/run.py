@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from drivers.interface.errors import DeviceError, TrundleError
@@ -61,7 +62,7 @@ def run(configuration: Configuration, options: RunOptions) -> RunResult:
         recorder = Recorder(
             options.log,
             configuration.log,
-            run_header(assembly.configuration, assembly.scene, options.seed),
+            partial(run_header, assembly.configuration, assembly.scene, options.seed),
             lockstep=assembly.lockstep,
             live=options.live,
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Hashable
+from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -73,7 +74,7 @@ def read(path: Path, folder: str) -> Mapping:
 def parse(path: Path) -> Mapping:
     """Parse one file.  Raises ConfigurationError with the file's name and the line."""
     try:
-        content = yaml.load(path.read_text(encoding="utf-8"), Loader=_StrictLoader)
+        content = copy.deepcopy(_loaded(path.read_text(encoding="utf-8")))
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else "?"
         raise ConfigurationError(f"{path}, line {line}: {error.problem}") from error
@@ -84,6 +85,11 @@ def parse(path: Path) -> Mapping:
     if not isinstance(content, dict):
         raise ConfigurationError(f"{path} holds {type(content).__name__}, not keys with values")
     return content
+
+
+@lru_cache(maxsize=64)  # an evaluation reads the same few files for every run
+def _loaded(text: str) -> Any:
+    return yaml.load(text, Loader=_StrictLoader)
 
 
 def merge(base: Mapping, over: Mapping) -> Mapping:

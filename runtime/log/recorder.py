@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -70,9 +71,9 @@ class Recorder:
     """
 
     def __init__(
-        self, path: Path | None, settings: LogSettings, header: RunHeader, *, lockstep: bool, live: bool = False
+        self, path: Path | None, settings: LogSettings, header: Callable[[], RunHeader], *, lockstep: bool, live: bool = False
     ) -> None:
-        """Touch nothing yet."""
+        """Touch nothing yet; `header` is asked for when the log is opened."""
         self._path, self._settings, self._header = path, settings, header
         self._lockstep, self._live = lockstep, live
         self._capacity = settings.queue_ticks
@@ -100,7 +101,7 @@ class Recorder:
         warm_up()
         try:
             port = self._settings.live_port if self._live else None
-            self._segments = Segments(self._path, self._settings, self._header, port)
+            self._segments = Segments(self._path, self._settings, self._header(), port)
         except OSError as error:
             self._fault = f"the log {self._path} cannot be created: {error.strerror}"
             return

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import TypeVar
 
@@ -34,13 +35,21 @@ def read_json(path: Path, model: type[M]) -> M:
     Raises:
         ConfigurationError: it cannot be read, is no JSON, or holds something else than the model says.
     """
+    text = read_text(path)
     try:
-        return model.model_validate(json.loads(read_text(path)))
+        validated = _validated(text, model)
     except json.JSONDecodeError as error:
         raise ConfigurationError(f"{path}, line {error.lineno}: it is no JSON: {error.msg}") from error
     except ValidationError as error:
         first = error.errors()[0]
         raise ConfigurationError(f"{path}: {'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+    assert isinstance(validated, model)
+    return validated
+
+
+@lru_cache(maxsize=4)  # a run draws its world twice, an evaluation those of one file again and again
+def _validated(text: str, model: type[Settings]) -> Settings:
+    return model.model_validate(json.loads(text))
 
 
 def chosen_world(path: Path, worlds: Mapping[str, W], number: int | None) -> W:

@@ -48,7 +48,7 @@ class Loop:
 def figures() -> list[Figure]:
     """Drive without a viewer, then with one that is stopped, then with that one killed."""
     with TemporaryDirectory() as folder:
-        recorder = Recorder(Path(folder) / "log.rrd", LogSettings(live_port=PORT), header(), lockstep=False, live=True)
+        recorder = Recorder(Path(folder) / "log.rrd", LogSettings(live_port=PORT), header, lockstep=False, live=True)
         recorder.open()
         loop = Loop(recorder)
         alone_ms, alone_missed = loop.drive(STALL_S)

@@ -69,7 +69,7 @@ def _paced() -> list[Figure]:
     gc.freeze()
     bare_ns, _ = _hand_over(_Deque(), ticks[:500])
     with TemporaryDirectory() as folder:
-        recorder = Recorder(Path(folder) / "log.rrd", LogSettings(), header(), lockstep=False)
+        recorder = Recorder(Path(folder) / "log.rrd", LogSettings(), header, lockstep=False)
         recorder.open()
         spent_ns, cpu_ns = _hand_over(recorder, ticks)
         report = recorder.close()

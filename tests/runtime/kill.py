@@ -27,7 +27,7 @@ SETTINGS = LogSettings(segment_mb=1.0)  # so small that some are killed while on
 
 def record_until_killed(path: Path) -> None:
     cycles = make_cycles(50, period_ns=PERIOD_NS)
-    recorder = Recorder(path, SETTINGS, header(), lockstep=False)
+    recorder = Recorder(path, SETTINGS, header, lockstep=False)
     recorder.open()
     begun_ns = time.monotonic_ns()
     for index in itertools.count():

@@ -71,7 +71,7 @@ def test_a_stalled_viewer_costs_what_it_would_have_seen_and_nobody_waits_for_it(
 
 def test_the_log_is_whole_although_nobody_can_see_it(tmp_path: Path) -> None:
     port = free_port()
-    recorder = Recorder(tmp_path / "a.rrd", LogSettings(live_port=port), header(), lockstep=True, live=True)
+    recorder = Recorder(tmp_path / "a.rrd", LogSettings(live_port=port), header, lockstep=True, live=True)
     recorder.open()
     with watcher(port, tmp_path / "b.rrd") as child:
         cycles = make_cycles(60)

@@ -21,7 +21,7 @@ def test_a_picture_is_in_the_log_and_not_in_what_is_replayed(tmp_path: Path) -> 
     cycles = make_cycles(6)
     picture = ColourFrame(Stamp(1, 2, 0), jpeg)
     cycles[3] = replace(cycles[3], sensed=replace(cycles[3].sensed, colour=picture))
-    recorder = Recorder(tmp_path / "a.rrd", LogSettings(), header(), lockstep=True)
+    recorder = Recorder(tmp_path / "a.rrd", LogSettings(), header, lockstep=True)
     recorder.open()
     for cycle in cycles:
         recorder.record(cycle)

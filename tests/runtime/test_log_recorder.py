@@ -22,7 +22,7 @@ CYCLES = make_cycles(60)
 
 
 def record(path: Path, cycles: list[Cycle], **settings: object) -> RecorderReport:
-    recorder = Recorder(path, LogSettings(**settings), header(), lockstep=True)  # type: ignore[arg-type]
+    recorder = Recorder(path, LogSettings(**settings), header, lockstep=True)  # type: ignore[arg-type]
     recorder.open()
     for cycle in cycles:
         recorder.record(cycle)
@@ -84,7 +84,7 @@ def test_a_missing_tick_is_a_difference(log: Path, tmp_path: Path) -> None:
 
 
 def test_a_full_queue_costs_drawings_first_and_then_ticks_and_all_is_counted(tmp_path: Path) -> None:
-    recorder = Recorder(tmp_path / "a.rrd", LogSettings(queue_ticks=10, flush_interval_s=10), header(), lockstep=False)
+    recorder = Recorder(tmp_path / "a.rrd", LogSettings(queue_ticks=10, flush_interval_s=10), header, lockstep=False)
     recorder.open()
     recorder._due = 11  # nobody wakes the writer
     for cycle in CYCLES[:14]:
@@ -117,7 +117,7 @@ def test_without_depth_a_log_says_that_it_cannot_be_replayed(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("path", ["missing/folder/a.rrd", "."])
 def test_a_log_that_cannot_be_created_is_a_fault_and_the_run_goes_on(tmp_path: Path, path: str) -> None:
-    recorder = Recorder(tmp_path / path, LogSettings(), header(), lockstep=True)
+    recorder = Recorder(tmp_path / path, LogSettings(), header, lockstep=True)
     recorder.open()
     assert recorder.fault().startswith(f"the log {tmp_path / path} cannot be created: ")
     recorder.record(CYCLES[0])
@@ -125,14 +125,14 @@ def test_a_log_that_cannot_be_created_is_a_fault_and_the_run_goes_on(tmp_path: P
 
 
 def test_it_can_be_closed_in_every_state(tmp_path: Path) -> None:
-    never = Recorder(tmp_path / "a.rrd", LogSettings(), header(), lockstep=False)
+    never = Recorder(tmp_path / "a.rrd", LogSettings(), header, lockstep=False)
     assert never.close() == never.close() == RecorderReport()
     assert not (tmp_path / "a.rrd").exists()
-    none = Recorder(None, LogSettings(), header(), lockstep=False)
+    none = Recorder(None, LogSettings(), header, lockstep=False)
     none.open()
     none.record(CYCLES[0])
     assert none.close() == RecorderReport()
-    twice = Recorder(tmp_path / "b.rrd", LogSettings(), header(), lockstep=False)
+    twice = Recorder(tmp_path / "b.rrd", LogSettings(), header, lockstep=False)
     twice.open()
     twice.open()
     twice.record(CYCLES[0])
@@ -155,7 +155,7 @@ def test_a_stalled_disk_costs_ticks_but_no_memory_and_no_time(tmp_path: Path, mo
     path = tmp_path / "a.rrd"
     os.mkfifo(path)
     reader = os.open(path, os.O_RDONLY | os.O_NONBLOCK)  # someone holds the other end and never reads
-    recorder = Recorder(path, LogSettings(flush_interval_s=0.05, queue_ticks=10), header(), lockstep=False)
+    recorder = Recorder(path, LogSettings(flush_interval_s=0.05, queue_ticks=10), header, lockstep=False)
     recorder.open()
     for cycle in CYCLES * 20:
         recorder.record(cycle)
@@ -172,11 +172,11 @@ def test_the_live_view_needs_no_file_and_a_free_port(tmp_path: Path) -> None:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        recorder = Recorder(None, LogSettings(live_port=port), header(), lockstep=True, live=True)
+        recorder = Recorder(None, LogSettings(live_port=port), header, lockstep=True, live=True)
         with pytest.raises(ConfigurationError, match=f"log.live_port {port} is taken"):
             recorder.open()
         assert recorder.close() == RecorderReport()
-    free = Recorder(None, LogSettings(live_port=port), header(), lockstep=True, live=True)
+    free = Recorder(None, LogSettings(live_port=port), header, lockstep=True, live=True)
     free.open()
     free.record(CYCLES[0])
     assert free.close() == RecorderReport(written_ticks=1, queue_high_water=1)
@@ -191,7 +191,7 @@ from runtime.log.reading.repair import repair
 from runtime.log.settings import LogSettings
 from tests.runtime.log_cycles import header, make_cycles
 cycles = make_cycles(10)
-recorder = Recorder(Path(sys.argv[1]), LogSettings(batch_ticks=10), header(), lockstep=True)
+recorder = Recorder(Path(sys.argv[1]), LogSettings(batch_ticks=10), header, lockstep=True)
 recorder.open()
 from dataclasses import replace
 for index in count():
