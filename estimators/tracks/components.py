@@ -33,3 +33,17 @@ def cells_of(component: Components, chosen: Mask) -> Mask:
         for column in range(component.shape[1]):
             cells[row, column] = chosen[component[row, column]]
     return cells
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def extents(component: Components, count: int) -> I64:
+    """Return how many columns and rows each component spans, shape (count, 2); the background, which is the first, none."""
+    low, high = np.full((count, 2), max(component.shape), np.int64), np.full((count, 2), -1, np.int64)
+    for row in range(component.shape[0]):
+        for column in range(component.shape[1]):
+            one = component[row, column]
+            if one > 0:
+                low[one, 0], low[one, 1] = min(low[one, 0], column), min(low[one, 1], row)
+                high[one, 0], high[one, 1] = max(high[one, 0], column), max(high[one, 1], row)
+    high[0] = low[0] - 1
+    return high - low + 1

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from filterpy.common import Q_discrete_white_noise
 from filterpy.kalman import predict, update
 
+from drivers.interface.samples import frozen_array
 from estimators.belief import F64
 
 POSITION = np.eye(2, 4)  # what of the state is measured
@@ -26,14 +28,19 @@ class Motion:
     covariance: F64  # (4, 4)
 
 
+@lru_cache(maxsize=64)  # frames and ticks come in a beat, so that few times occur
+def _over(elapsed_s: float, acceleration_m_s2: float) -> tuple[F64, F64]:
+    """Return the transition of the state over a time, and the covariance that it adds: (4, 4) each."""
+    noise = Q_discrete_white_noise(dim=2, dt=elapsed_s, var=acceleration_m_s2**2, block_size=2, order_by_dim=False)
+    return frozen_array(np.eye(4) + elapsed_s * np.eye(4, k=2)), frozen_array(np.asarray(noise))
+
+
 class ConstantVelocity:
     """Carries motions over one stretch of time."""
 
     def __init__(self, elapsed_s: float, acceleration_m_s2: float) -> None:
         """`acceleration_m_s2` is the standard deviation of what changes the velocity."""
-        self._transition = np.eye(4) + elapsed_s * np.eye(4, k=2)
-        noise = Q_discrete_white_noise(dim=2, dt=elapsed_s, var=acceleration_m_s2**2, block_size=2, order_by_dim=False)
-        self._noise: F64 = np.asarray(noise)
+        self._transition, self._noise = _over(elapsed_s, acceleration_m_s2)
 
     def carry(self, motion: Motion) -> Motion:
         """Return the motion after the time."""

@@ -15,7 +15,7 @@ from estimators.belief import F64, OCCUPIED, U8, Lattice, Mask, OccupancyGrid
 from estimators.grid.labelling import FrameLabels
 from estimators.memory.remembered import Remembered
 from estimators.memory.rolling import transfer
-from estimators.tracks.components import cells_of, sizes
+from estimators.tracks.components import cells_of, extents, sizes
 from estimators.tracks.outline import Outline, apparent_radius_m, bearing_of, centre_of, outline_of
 from estimators.tracks.traces import Traces
 
@@ -47,6 +47,7 @@ def warm_up() -> None:
     nothing = OccupancyGrid(Lattice(0.0, 0.0, 1.0, 8, 8), frozen_array(np.zeros((8, 8), dtype=np.uint8)))
     component = np.zeros((8, 8), dtype=np.int32)
     cells_of(component, Traces().moving(nothing, component, np.zeros(1), 0))
+    extents(component, 1)
     outline = outline_of(np.ones((1, 2)), 0.0, 0.0, nothing.label, 0.0, 0.0, 1.0)
     bearing_of(outline, 1.0)
     centre_of(np.ones((1, 2)), outline, 1.0)
@@ -78,8 +79,8 @@ def surfaces_of(frame: FrameLabels, remembered: Remembered, traces: Traces, stam
     lattice, seen = frame.grid.lattice, frame.grid.label == OCCUPIED
     static = transfer((remembered.grid.label == OCCUPIED) & ~remembered.came, remembered.grid.lattice, lattice, False)
     explained = cv2.dilate(static.view(np.uint8), NEIGHBOURS) != 0
-    length, component, boxes, _ = cv2.connectedComponentsWithStats(_joined(seen), connectivity=8)
-    sides = boxes[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]] - 2  # (length, 2): it was joined by a cell all around
+    length, component = cv2.connectedComponents(_joined(seen), connectivity=8)
+    sides = extents(component, length) - 2  # (length, 2): it was joined by a cell all around
     moving = cells_of(component, traces.moving(frame.grid, component, lattice.cell_m * np.hypot(*sides.T), stamp_ns))
     unexplained = np.asarray(seen & (moving | ~explained))
     apart = sizes(component, unexplained, length) > STATIC_SHARE * sizes(component, seen, length)
