@@ -18,6 +18,7 @@ from estimators.field_query import sample
 from planners.static_field import GRID_M, STILL_M_S
 
 SECOND_NS = 1_000_000_000
+STEADY_S = 0.5  # time constant of the velocity that counts: a track that sees another side of somebody jumps for a look or two
 CAME_M = 0.3  # from where it was first seen; what stands, and is seen from here and from there, shifts by less
 SLOWED = 0.7  # of the velocity that it came with
 _EXACT = frozen_array(np.zeros((4, 4)))
@@ -29,6 +30,7 @@ class _Way:
 
     origin: tuple[float, float]  # where it was first seen
     came: bool  # it has left its origin
+    steady: tuple[float, float]  # its velocity, smoothed
     velocity: tuple[float, float]  # that it last kept up; until it came, that of now, as a new track's is a guess
     kept_ns: int  # when it last drove as fast as that
     place: tuple[float, float]  # where it stood when it stood last
@@ -43,6 +45,7 @@ class Resters:
         """Who has not gone on for `patience_s` stays."""
         self._patience_ns = round(patience_s * SECOND_NS)
         self._ways: dict[int, _Way] = {}
+        self._stamp_ns = 0  # of the belief before
 
     def observe(self, belief: Belief) -> tuple[tuple[Track, tuple[float, float]], ...]:
         """Take in the tracks of a belief; return those that may set off, and with which velocity [m/s] in odom."""
@@ -50,6 +53,7 @@ class Resters:
         seen = {track.identity for track in tracks}
         left = {name: way for name, way in self._ways.items() if name not in seen and self._waits(way, tracks, belief)}
         self._ways = {track.identity: self._way(track, belief.stamp_ns) for track in tracks} | left
+        self._stamp_ns = belief.stamp_ns
         tracks += [Track(name, way.place, (0.0, 0.0), way.radius_m, _EXACT) for name, way in left.items()]
         found = ((track, self._ways[track.identity]) for track in tracks)
         return tuple(
@@ -71,24 +75,27 @@ class Resters:
         here, now, radius_m = track.position_in_odom, track.velocity_in_odom, track.radius_m
         before = self._ways.get(track.identity)
         if before is None:
-            return _Way(here, False, now, now_ns, here, radius_m, False)
-        speed_m_s = math.hypot(*now)
+            return _Way(here, False, now, now, now_ns, here, radius_m, False)
+        share = 1.0 - math.exp((self._stamp_ns - now_ns) / (STEADY_S * SECOND_NS))
+        steady = before.steady[0] + share * (now[0] - before.steady[0]), before.steady[1] + share * (now[1] - before.steady[1])
+        least_m_s, speed_m_s = SLOWED * math.hypot(*before.velocity), math.hypot(*now)
         came = before.came or math.dist(here, before.origin) > CAME_M
-        kept = speed_m_s >= SLOWED * math.hypot(*before.velocity)
+        kept = min(speed_m_s, math.hypot(*steady)) >= least_m_s
         place, stands = (here, True) if speed_m_s < STILL_M_S else (before.place, before.stands and not kept)
         if kept or not came or now_ns - before.kept_ns > self._patience_ns:
-            return _Way(before.origin, came, now, now_ns, place, radius_m, stands)
-        return _Way(before.origin, came, before.velocity, before.kept_ns, place, radius_m, stands)
+            return _Way(before.origin, came, steady, steady, now_ns, place, radius_m, stands)
+        return _Way(before.origin, came, steady, before.velocity, before.kept_ns, place, radius_m, stands)
 
     def snapshot(self) -> bytes:
         """Return the whole state."""
         ways = self._ways.values()
         return pack(
             identity=np.array(list(self._ways), np.int64),
-            numbers=np.array([(*way.origin, *way.velocity, *way.place, way.radius_m) for way in ways]).reshape(-1, 7),
+            numbers=np.array([(*way.origin, *way.steady, *way.velocity, *way.place, way.radius_m) for way in ways]).reshape(-1, 9),
             came=np.array([way.came for way in ways], np.bool_),
             stands=np.array([way.stands for way in ways], np.bool_),
             kept_ns=np.array([way.kept_ns for way in ways], np.int64),
+            stamp_ns=self._stamp_ns,
         )
 
     def restore(self, snapshot: bytes) -> None:
@@ -96,6 +103,7 @@ class Resters:
         state = unpack(snapshot)
         rows = zip(*(state[name].tolist() for name in ("identity", "numbers", "came", "stands", "kept_ns")), strict=True)
         self._ways = {
-            name: _Way((n[0], n[1]), came, (n[2], n[3]), kept_ns, (n[4], n[5]), n[6], stands)
+            name: _Way((n[0], n[1]), came, (n[2], n[3]), (n[4], n[5]), kept_ns, (n[6], n[7]), n[8], stands)
             for name, n, came, stands, kept_ns in rows
         }
+        self._stamp_ns = int(state["stamp_ns"])
