@@ -57,7 +57,7 @@ class PredictionSettings(Settings):
     floor: float = Field(default=0.02, ge=0.0, lt=1.0, description="least weight of a conjecture")
     top_k: int = Field(default=4, ge=1, le=6, description="futures are drawn from so many of the heaviest conjectures")
     drift_m_s2: float = Field(
-        default=1.0,
+        default=0.5,
         ge=0.0,
         le=20.0,
         description="standard deviation of what changes a believed velocity, each axis: a track takes back its first guesses",

@@ -79,7 +79,7 @@ class RcspSettings(Settings):
     )
     rest_step_s: float = Field(default=0.6, gt=0.0, le=2.0, description="each of these steps")
     blocked: Literal["stand", "make_way"] = Field(
-        default="stand",
+        default="make_way",
         description="what it does while the way is blocked: it stands, or stays there but makes way for who comes",
     )
     hold_m: float = Field(default=0.05, ge=0.0, le=1.0, description="a rollout brakes where what stands still is nearer")

@@ -91,7 +91,7 @@ class Resters:
         ways = self._ways.values()
         return pack(
             identity=np.array(list(self._ways), np.int64),
-            numbers=np.array([(*way.origin, *way.steady, *way.velocity, *way.place, way.radius_m) for way in ways]).reshape(-1, 9),
+            numbers=np.array([_numbers(way) for way in ways]).reshape(-1, 9),
             came=np.array([way.came for way in ways], np.bool_),
             stands=np.array([way.stands for way in ways], np.bool_),
             kept_ns=np.array([way.kept_ns for way in ways], np.int64),
@@ -107,3 +107,7 @@ class Resters:
             for name, n, came, stands, kept_ns in rows
         }
         self._stamp_ns = int(state["stamp_ns"])
+
+
+def _numbers(way: _Way) -> tuple[float, ...]:
+    return (*way.origin, *way.steady, *way.velocity, *way.place, way.radius_m)
