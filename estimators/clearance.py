@@ -18,8 +18,9 @@ SECOND_NS = 1_000_000_000
 
 
 class ClearanceSettings(Settings):
-    """How the rate is smoothed."""
+    """Whether and how the rate is made."""
 
+    rate: bool = Field(default=True, description="whether the rate is worked out; false where nobody reads it, it is zero then")
     rate_smoothing: float = Field(default=0.3, gt=0.0, le=1.0, description="weight of a new rate, per 0.2 s as in the paper")
 
 
@@ -78,7 +79,7 @@ class ClearanceEstimator:
     def update(self, grid: OccupancyGrid, stamp_ns: int) -> ClearanceField:
         """Return the field for a grid at `stamp_ns`; with the stamp of the frame before, rates are carried over."""
         known = grid.label != UNKNOWN
-        if self._grid is None or self._field is None:
+        if self._grid is None or self._field is None or not self._settings.rate:
             overlap, rate = np.zeros_like(known), np.zeros(known.shape, dtype=np.float32)
         else:
             overlap, rate = self._smoothed_rate(self._grid, self._field.rate_m_s, grid, known, stamp_ns)

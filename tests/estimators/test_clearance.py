@@ -100,6 +100,18 @@ def test_a_wall_that_comes_into_view_is_not_an_approach():
     assert not field.rate_m_s.any()
 
 
+def test_a_rate_that_is_not_asked_for_is_zero_and_clearances_are_the_same():
+    with_rate, without = estimator(rate_smoothing=1.0), estimator(rate=False)
+    for step, column in enumerate((60, 58)):
+        label = empty()
+        label[:, column] = OCCUPIED
+        moved, still = (one.update(grid_of(label), step * FRAME_NS) for one in (with_rate, without))
+    assert moved.rate_m_s.any()
+    assert not still.rate_m_s.any()
+    assert not still.overlap.any()
+    np.testing.assert_array_equal(still.clearance_m, moved.clearance_m)
+
+
 def test_the_smoothing_is_the_papers_at_any_frame_rate():
     """After a step of the rate, the smoothed one has covered 1 - 0.7^(t / 0.2 s) of it."""
     for frame_ns in (40_000_000, 100_000_000, 200_000_000):
