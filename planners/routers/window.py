@@ -11,6 +11,8 @@ from estimators.belief import Lattice
 
 F64 = NDArray[np.float64]
 
+_NEXT, _BEFORE = np.array([1, 2, 3, 0]), np.array([3, 0, 1, 2])  # of the four corners, or sides
+
 
 def around(lattice: Lattice, point: F64, reach_m: float) -> tuple[NDArray[np.intp], NDArray[np.intp], F64]:
     """Return the cells in a square around a point, which holds all whose centres are within reach of it.
@@ -56,11 +58,11 @@ def remainder_outside(points: F64, side: NDArray[np.intp], low: F64, high: F64, 
     """
     corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
     faces = np.array([goal[1] < low[1], goal[0] > high[0], goal[1] > high[1], goal[0] < low[0]])
-    edge = np.hypot(*(np.roll(corners, -1, axis=0) - corners).T)  # of side k, from corner k to corner k + 1
-    corner = np.where(faces | np.roll(faces, 1), np.hypot(*(corners - goal).T), np.inf)
+    edge = np.hypot(*(corners[_NEXT] - corners).T)  # of side k, from corner k to corner k + 1
+    corner = np.where(faces | faces[_BEFORE], np.hypot(*(corners - goal).T), np.inf)
     for _ in range(2):  # no corner is farther than two edges from one that sees the goal
-        corner = np.minimum(corner, np.minimum(np.roll(corner, -1) + edge, np.roll(corner + edge, 1)))
-    after = (side + 1) % 4
+        corner = np.minimum(corner, np.minimum(corner[_NEXT] + edge, (corner + edge)[_BEFORE]))
+    after = _NEXT[side]
     round_corners = np.minimum(
         np.hypot(*(points - corners[side]).T) + corner[side], np.hypot(*(points - corners[after]).T) + corner[after]
     )
