@@ -5,6 +5,7 @@ Ours; the paper's field says only that something closes in.  README.md beside th
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -18,13 +19,14 @@ from planners.clearance_manifold.ridge_kernels import Sections
 
 SIDE_S = 6.0  # so long before he passes a hand is chosen: from where who walks slowly comes into view
 FAR_M = 0.7  # so far from the line of who comes he is nobody's
-GAIN_M = 0.5  # the other hand must be better by this
-BOUND_FOR_S = 0.6  # so long a velocity across the way leads on before the robot could turn back
+GAIN_M, ONLY_M = 0.4, 0.2  # the other hand must be better by this, and if only that one can still be got to
+BRANCH = 0.25  # of what a branch costs a station: where there is no room it is 5 m and more, and noise is 0.5 m
+BOUND_FOR_S = 0.5  # so long a velocity across the way leads on before the robot could turn back
 STRAIGHT_ON_M = 0.2  # with a miss smaller than this somebody comes straight on
 
 
 class Passing:
-    """Chooses a hand when somebody begins to come, and changes it only while the robot can still get to the other one."""
+    """Chooses a hand when somebody begins to come, and keeps it unless the other is much better, or alone can be got to yet."""
 
     def __init__(self, solver: Solver, apart_m: float, speed_m_s: float) -> None:
         """Take what knows the branches, how far apart who passes is kept, and how fast the robot gets there."""
@@ -62,26 +64,38 @@ class Passing:
         if not comes:
             return 0.0, scene
         along = runs_along(normal, scene.closing)
-        bound_for = scene.robot + BOUND_FOR_S * float(velocity @ normal) * normal
+        goes_on = along or self._hand != 0.0  # towards who only begins to cross, it need not
+        bound_for = scene.robot + BOUND_FOR_S * velocity if goes_on else scene.robot
         miss_m = meeting(bound_for, scene.closing)[1]
-        if self._hand == 0.0 or self._can_change(miss_m, time_s):
-            self._choose(scene, miss_m, along=along)
+        gain_m = self._gain(miss_m, time_s)
+        if gain_m < math.inf:
+            self._choose(scene, miss_m, gain_m, along=along)
         return self._hand, self._beside(scene, self._hand) if along else scene
 
-    def _can_change(self, miss_m: float, time_s: float) -> bool:
-        """Return whether the robot gets to the other hand from where it is bound for before he passes."""
-        return self._apart_m + self._hand * miss_m <= self._speed_m_s * max(0.0, time_s - BOUND_FOR_S)
+    def _gain(self, miss_m: float, time_s: float) -> float:
+        """Return by how much the other hand must be better [m].
 
-    def _choose(self, scene: Scene, miss_m: float, *, along: bool) -> None:
-        """Take the hand with the shorter way aside and, of who comes along the way, the better branch."""
+        By less where only that one can be got to before he passes, from where the robot is bound for; infinitely where only
+        this one can.
+        """
+        if self._hand == 0.0:
+            return -math.inf
+        reach_m = self._speed_m_s * max(0.0, time_s - BOUND_FOR_S)
+        this, other = (self._apart_m - hand * miss_m <= reach_m for hand in (self._hand, -self._hand))
+        if this == other:
+            return GAIN_M
+        return math.inf if this else ONLY_M
+
+    def _choose(self, scene: Scene, miss_m: float, gain_m: float, *, along: bool) -> None:
+        """Take the hand with the shorter way aside and, of who comes along the way, the better branch, if it is by that much."""
         burdens = {hand: max(0.0, self._apart_m - hand * miss_m) for hand in (-1.0, 1.0)}
         if along:
-            burdens = {hand: aside_m + self._solver.pays(self._beside(scene, hand)) for hand, aside_m in burdens.items()}
+            burdens = {hand: m + BRANCH * self._solver.pays(self._beside(scene, hand)) for hand, m in burdens.items()}
         elif self._hand == 0.0 and abs(miss_m) < STRAIGHT_ON_M:  # who crosses is passed behind
             normal, (x, y) = scene.sections.normal[self._solver.own], scene.closing[2:4]
             burdens = {hand: -hand * float(normal @ (x, y)) * float(normal @ (-y, x)) for hand in burdens}
         better = min(burdens, key=lambda hand: burdens[hand])
-        if self._hand == 0.0 or burdens[self._hand] - burdens[better] > GAIN_M:
+        if burdens.get(self._hand, math.inf) - burdens[better] > gain_m:
             self._hand = better
 
     def _beside(self, scene: Scene, hand: float) -> Scene:

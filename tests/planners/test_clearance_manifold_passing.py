@@ -104,7 +104,7 @@ def test_who_is_beside_the_robot_is_not_fled_from_but_not_gone_to_either():
 def test_the_hand_is_kept_when_the_line_of_who_comes_sways():
     chooses = passing()
     first, _ = chooses.update(scene_of(coming(2.2, 0.02, -1.0, 0.0)), STANDS, begins=True)
-    for tick, sway_m in enumerate((-0.03, 0.04, -0.1, 0.15, -0.15, 0.2, -0.2)):
+    for tick, sway_m in enumerate((-0.03, 0.04, -0.08, 0.09, -0.15, 0.18, -0.18)):
         closing = coming(2.1 - 0.25 * tick, sway_m, -1.0, 0.0)
         hand, scene = chooses.update(scene_of(closing), STANDS, begins=False)
         assert hand == first
@@ -112,14 +112,23 @@ def test_the_hand_is_kept_when_the_line_of_who_comes_sways():
         assert give_way(STANDS, STANDS, closing, APART_M, 9.0, hand)[1] * hand > 0.0
 
 
-@pytest.mark.parametrize(("distance_m", "changes"), [(2.4, True), (0.7, False)])
-def test_the_hand_changes_only_while_there_is_time_to_get_to_the_other_one(distance_m, changes):
+@pytest.mark.parametrize(("distance_m", "goes_m_s", "changes"), [(2.4, 0.0, True), (0.7, -0.5, False)])
+def test_the_hand_that_the_robot_goes_to_is_kept_when_he_is_near(distance_m, goes_m_s, changes):
     """He had come along on the robot's left, and now comes along 0.4 m to its right."""
     chooses = passing()
     before, _ = chooses.update(scene_of(coming(2.5, 0.4, -1.0, 0.0)), STANDS, begins=True)
-    after, _ = chooses.update(scene_of(coming(distance_m, -0.4, -1.0, 0.0)), STANDS, begins=False)
+    after, _ = chooses.update(scene_of(coming(distance_m, -0.4, -1.0, 0.0)), np.array([0.0, goes_m_s]), begins=False)
     assert before == -1.0
     assert (after == 1.0) is changes
+
+
+@pytest.mark.parametrize(("goes_m_s", "changes"), [(0.0, True), (0.3, False)])
+def test_a_hand_that_cannot_be_got_to_any_more_is_left_for_one_that_can(goes_m_s, changes):
+    """He is there after 1.5 s, 0.2 m on the other hand; it stands, or already goes where he has his hand."""
+    chooses = passing()
+    chooses.take({"hand": np.array(1.0)})
+    hand, _ = chooses.update(scene_of(coming(1.5, 0.2, -1.0, 0.0)), np.array([0.0, goes_m_s]), begins=False)
+    assert (hand == -1.0) is changes
 
 
 def test_a_hand_that_leads_nowhere_is_changed_for_the_one_that_does_and_not_for_one_that_hardly_is_better():
