@@ -19,9 +19,10 @@ from estimators.field_query import sample
 FREE_AROUND_M = 0.45  # a place in view with so much clearance is nobody's
 SURE_S = 0.3  # what was seen to close in for less is the noise of a rate
 SURE = 2.0  # and so is a velocity of less than so many standard deviations: a wall seen while turning has rates, too
+FIRST = 0.5  # share of the velocity that the first rates of something new give: what comes into view has any rate
 MIDDLE_M = 0.08  # noise of a boundary's middle
 RATE_M_S = 0.5  # and of the velocity that its rates give,
-FASTEST_M_S = 1.5  # and nobody walks faster: what comes into view has any rate
+FASTEST_M_S = 1.5  # and nobody walks faster
 RATE_S = 0.56  # which are the same for so long: the smoothing of the field rate
 SWERVE_M_S = 0.5  # by which its velocity wanders in a second
 STILL_M_S = 0.15  # what moves no faster does not close in
@@ -59,7 +60,8 @@ class ClosingMemory:
             if same:
                 self._weigh(found, elapsed_s)
             else:
-                self._kept, self._spread = found.copy(), np.array([MIDDLE_M**2, 0.0, RATE_M_S**2])
+                self._kept, self._spread = found.copy(), np.array([MIDDLE_M**2, 0.0, FIRST * RATE_M_S**2])
+                self._kept[2:4] *= FIRST
             self._seen_s = self._seen_s + elapsed_s if same else 0.0
             self._unseen_s = 0.0
             return self._kept.copy() if np.hypot(*self._kept[2:4]) > STILL_M_S else np.zeros(5)

@@ -28,6 +28,8 @@ CENTRING = 0.05
 TURN = 1.5
 ENCOUNTER_S = 3.0  # how far ahead a side is chosen for
 LIKING = 0.3
+IN_TIME = 0.4  # of the time until the robot is at a station, or what closes in: by then it has as much room as there is
+SOONEST_S = 0.2  # the paper's step
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +67,7 @@ class Solver:
         kept_m = max(self.least_m, setup.kept_clear_m)
         ample_m = kept_m + s.ample_m
         self._demand = Demand(self.least_m, kept_m, ample_m, max(s.ridge_enough_m, ample_m), CENTRING)
-        self._step_towards_m = tracker.lipschitz_m_s * period_s
+        self._period_s, self._step_towards_m = period_s, tracker.lipschitz_m_s * period_s
         self._offsets = np.linspace(-s.half_width_m, s.half_width_m, s.cross_samples)
         self._spacing = np.diff(stations.arcs_m[stations.own :])
         self._step_m = 2.0 * s.half_width_m / (s.cross_samples - 1)
@@ -93,6 +95,24 @@ class Solver:
             return np.concatenate((y, beyond)), 0.0
         now = cost_along(costs, self._offsets, spacing, scene.robot_m, TURN, liked[own : scene.end])
         return np.concatenate((y, beyond)), (now - least) / len(y)
+
+    def better(self, scene: Scene, followed: F64, valid: int) -> bool:
+        """Return whether a branch that leads another way is better by `switch_gain_m` per station than the one followed.
+
+        One that leads the same way has rho_min half way between the two; the repair gets there without a jump.
+
+        Args:
+            scene: what it is laid through.
+            followed: offsets, shape (n,).
+            valid: stations from the robot's own on at which the two are compared.
+        """
+        best, gain_m = self.branch(scene, followed)
+        if gain_m <= self._tracker.switch_gain_m:
+            return False
+        ahead = slice(self._stations.own, self._stations.own + valid)
+        between = Sections(*(part[ahead] for part in scene.sections))
+        room = along_manifold(scene.ground, points_of(between, 0.5 * (followed[ahead] + best[:valid])))
+        return bool((room < self.least_m).any())
 
     def _costs(self, scene: Scene) -> F64:
         """Return the costs of all stations ahead and offsets, shape (n, m)."""
@@ -139,15 +159,25 @@ class Solver:
     def _boxes(self, scene: Scene, inside: F64, around: F64 | None) -> F64:
         """Return the boxes of proposition 1, the ridges, and what is kept to inside of the boxes: low, high, shape (n, 5) [m].
 
-        That is the ample part of the box (`ample_boxes`); who is outside of it at `around`, shape (n,), comes towards it no
-        faster than P4 allows.
+        That is the ample part of the box (`ample_boxes`); who is outside of it at `around`, shape (n,), comes towards it in time
+        for the robot, and no faster than P4 allows.
         """
         found = boxes(scene.ground, scene.sections, inside, self._step_m, self._demand)
         kept = ample_boxes(scene.ground, scene.sections, found, self._step_m, self._demand)
         if around is not None:
-            kept[:, 0] = np.maximum(found[:, 0], np.minimum(kept[:, 0], around + self._step_towards_m))
-            kept[:, 1] = np.minimum(found[:, 1], np.maximum(kept[:, 1], around - self._step_towards_m))
+            step_m = self._towards(np.fmax(kept[:, 0] - around, around - kept[:, 1]), scene)
+            kept[:, 0] = np.maximum(found[:, 0], np.minimum(kept[:, 0], around + step_m))
+            kept[:, 1] = np.minimum(found[:, 1], np.maximum(kept[:, 1], around - step_m))
         return np.hstack((found, kept))
+
+    def _towards(self, away_m: F64, scene: Scene) -> F64:
+        """Return how far stations that are `away_m`, shape (n,), from their ample room come towards it in this tick.
+
+        What is far ahead has time: noise there moves the manifold little, and a better view corrects it.
+        """
+        meet_m_s = scene.speed_m_s + float(np.hypot(*scene.closing[2:4]))
+        within_s = np.maximum(IN_TIME / meet_m_s * np.abs(self._stations.arcs_m), SOONEST_S)
+        return np.asarray(np.fmin(np.fmax(away_m, 0.0) * (self._period_s / within_s), self._step_towards_m))
 
     def _solve(
         self, scene: Scene, program: OffsetProgram, found: F64, references: tuple[F64, ...], start: F64, duals: F64

@@ -33,7 +33,7 @@ from planners.clearance_manifold.properties import check
 from planners.clearance_manifold.reading import Reader
 from planners.clearance_manifold.ridge_kernels import Ground, Sections
 from planners.clearance_manifold.settings import ClearanceManifoldSettings
-from planners.clearance_manifold.tracker import Category, Continuation, Tracker
+from planners.clearance_manifold.tracker import SECOND_NS, Category, Continuation, Tracker
 from planners.clearance_manifold.waiting import Waiting
 from planners.clearance_manifold.warm_up import rehearse
 from planners.planner import Plan, PlannerSetup
@@ -70,6 +70,7 @@ class ClearanceManifold:
         self._waiting = Waiting(settings.waiting, setup.limits.velocity.wz)
         self._chart: Chart | None = None
         self._arc_m = 0.0  # of the robot on the chart
+        self._escapes_ns = 0  # since when the route leaves it; 0: it does not
         self._ticks = np.zeros(2, np.int64)  # continued, all
 
     def warm_up(self) -> None:
@@ -88,7 +89,7 @@ class ClearanceManifold:
         self._waiting.over()
         pose = belief.odom_from_base
         point = self._control_point(pose)
-        new_goal = self._follow_route(route, point, predicted.closing)
+        new_goal = self._follow_route(route, point, predicted.closing, belief.stamp_ns)
         assert self._chart is not None
         scene = self._scene(self._chart, predicted, belief, point)
         hand, scene = self._passing.update(scene, _velocity(belief), begins=predicted.begins)
@@ -132,7 +133,7 @@ class ClearanceManifold:
         ahead_m = 0.0 if self._limits.holonomic else self._settings.controller.look_ahead_m
         return np.array([pose.x + ahead_m * math.cos(pose.yaw), pose.y + ahead_m * math.sin(pose.yaw)])
 
-    def _follow_route(self, route: Route, point: F64, closing: F64) -> bool:
+    def _follow_route(self, route: Route, point: F64, closing: F64, stamp_ns: int) -> bool:
         """Keep the chart, or lay a new one where the route left it; return whether the goal is another.
 
         The route leads around who comes along the way, shape (5,), as if he stood, now on one side of him and now on the other.
@@ -143,8 +144,12 @@ class ClearanceManifold:
         if self._chart is not None and moved_m < self._settings.chart.escape_m:
             self._arc_m = float(self._chart.project(point[None], self._arc_m)[0, 0])
             normal = self._chart.frames(np.array([self._arc_m]), 1.0)[1][0]
-            if moved_m < 0.05 and (meets(point, normal, closing) or not self._escapes(self._chart, route.path_in_odom)):
+            escapes = not meets(point, normal, closing) and self._escapes(self._chart, route.path_in_odom)
+            self._escapes_ns = (self._escapes_ns or stamp_ns) if escapes else 0
+            left = escapes and stamp_ns - self._escapes_ns >= round(self._settings.chart.escape_s * SECOND_NS)
+            if moved_m < 0.05 and not left:
                 return False
+        self._escapes_ns = 0
         behind = self._behind(point, route.path_in_odom)
         self._chart = lay_chart(route.path_in_odom, goal, behind, self._settings.chart)
         self._arc_m = float(self._chart.project(point[None])[0, 0])
@@ -228,6 +233,7 @@ class ClearanceManifold:
             line=np.zeros((0, 2)) if chart is None else chart.line,
             goal=np.zeros(2) if chart is None else chart.goal,
             arc_m=self._arc_m,
+            escapes_ns=self._escapes_ns,
             ticks=self._ticks,
             **self._field.state(),
             **self._tracker.state(),
@@ -241,7 +247,7 @@ class ClearanceManifold:
         """Take over a state."""
         state = unpack(snapshot)
         self._chart = Chart(state["line"], state["goal"]) if len(state["line"]) else None
-        self._arc_m, self._ticks = float(state["arc_m"]), state["ticks"]
+        self._arc_m, self._ticks, self._escapes_ns = float(state["arc_m"]), state["ticks"], int(state["escapes_ns"])
         self._field.take(state)
         self._tracker.take(state)
         self._passing.take(state)

@@ -35,6 +35,7 @@ class ChartSettings(Settings):
         default=0.8, ge=0.0, le=5.0, description="length over which the route is smoothed into a centre line"
     )
     escape_m: float = Field(default=0.8, gt=0.0, le=5.0, description="a route this far off the centre line asks for a new one")
+    escape_s: float = Field(default=0.6, ge=0.0, le=10.0, description="when it has been so far off for so long")
 
 
 class SolverSettings(Settings):
@@ -73,6 +74,7 @@ class TrackerSettings(Settings):
         default=0.3, ge=0.0, le=10.0, description="clearance that a metre off the predicted offset must gain"
     )
     switch_gain_m: float = Field(default=0.05, ge=0.0, le=2.0, description="clearance per station that another branch must gain")
+    doubt_s: float = Field(default=0.4, ge=0.0, le=10.0, description="for how long it must have been better by that")
     repaired_share: float = Field(
         default=0.3, ge=0.0, le=1.0, description="of the forward stations; fewer repaired: the tube collapsed"
     )

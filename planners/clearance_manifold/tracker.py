@@ -71,7 +71,7 @@ class Tracker:
         self._point: F64 = np.zeros(2)  # that follows the manifold
         self._stamp_ns = 0
         self._looked_ns = 0
-        self._doubted = False  # another branch was better when it was looked at last; it is taken when it still is
+        self._doubted_ns = 0  # since when another branch is better; 0: none is
 
     @property
     def tube_m(self) -> float:
@@ -103,7 +103,7 @@ class Tracker:
             manifold, duals, converged, trigger = self._continue(scene, prior, max(elapsed_s, self._period_s), belief.stamp_ns)
             category = Category.NONE if manifold is not None else Category.REGULAR
         if manifold is None:
-            self._doubted = False
+            self._doubted_ns = 0
             keep = prior if category is Category.REGULAR else None
             manifold = self._solver.extract(scene, keep)
             duals = np.zeros(len(scene.arcs_m))
@@ -148,13 +148,21 @@ class Tracker:
             return None, duals, converged, "tangents disagree"
         least = float(manifold.clearance_m[manifold.ahead].min()) if manifold.valid else 0.0
         pressed = least < self._solver.least_m + PRESSED_M
-        wait_s = PRESSED_S if pressed or self._doubted else self._solver_settings.skip_s
-        if stamp_ns - self._looked_ns >= round(wait_s * SECOND_NS):
-            self._looked_ns, doubted = stamp_ns, self._doubted
-            self._doubted = self._solver.branch(scene, prior.offset_m)[1] > s.switch_gain_m
-            if doubted and self._doubted:
-                return None, duals, converged, "better branch"
+        if self._leaves(scene, prior, min(manifold.valid, scene.end - own), stamp_ns, pressed=pressed):
+            return None, duals, converged, "better branch"
         return manifold, duals, converged, ""
+
+    def _leaves(self, scene: Scene, prior: Prior, valid: int, stamp_ns: int, *, pressed: bool) -> bool:
+        """Look at other branches when it is time to; return whether one was better for long enough."""
+        wait_s = PRESSED_S if pressed or self._doubted_ns else self._solver_settings.skip_s
+        if stamp_ns - self._looked_ns < round(wait_s * SECOND_NS):
+            return False
+        self._looked_ns = stamp_ns
+        if not self._solver.better(scene, prior.offset_m, valid):
+            self._doubted_ns = 0
+            return False
+        self._doubted_ns = self._doubted_ns or stamp_ns
+        return stamp_ns - self._doubted_ns >= round(self._settings.doubt_s * SECOND_NS)
 
     def _compare(self, scene: Scene, manifold: Manifold, prior: Prior | None, elapsed_s: float) -> tuple[float, float, bool]:
         if prior is None or not manifold.valid:
@@ -179,8 +187,7 @@ class Tracker:
             "offset_m": self._offset_m,
             "duals": self._duals,
             "robot": np.array([robot.x, robot.y, robot.yaw, *self._point]),
-            "stamps_ns": np.array([self._stamp_ns, self._looked_ns], np.int64),
-            "doubted": np.array(self._doubted),
+            "stamps_ns": np.array([self._stamp_ns, self._looked_ns, self._doubted_ns], np.int64),
             **self._drift.state(),
         }
 
@@ -191,8 +198,7 @@ class Tracker:
         x, y, yaw, *point = state["robot"].tolist()
         self._point = np.array(point)
         self._robot = SE2(x, y, yaw)
-        self._stamp_ns, self._looked_ns = (int(stamp) for stamp in state["stamps_ns"])
-        self._doubted = bool(state["doubted"])
+        self._stamp_ns, self._looked_ns, self._doubted_ns = (int(stamp) for stamp in state["stamps_ns"])
         self._drift.take(state)
 
 

@@ -9,6 +9,7 @@ import pytest
 from drivers.interface.commands import BodyTwist
 from drivers.interface.geometry import SE2
 from estimators.belief import OCCUPIED, UNKNOWN
+from planners.clearance_manifold.controller import APPROACH
 from planners.clearance_manifold.planner import ClearanceManifold
 from planners.clearance_manifold.settings import ClearanceManifoldSettings
 from planners.planner import PlannerSetup, no_path
@@ -85,23 +86,58 @@ def test_a_base_that_looked_aside_for_long_backs_off_until_it_sees_what_is_right
     assert way[-1] > 0.3  # and then it goes
 
 
-def test_another_branch_is_taken_when_it_is_still_better_at_the_next_look_which_comes_soon(monkeypatch):
-    planner, gain, looks = planner_of(), [0.0], []
-    solver = planner._tracker._solver
-    branch = solver.branch
-
-    def look(scene, liked):
-        looks.append(gain[0])
-        return branch(scene, liked)[0], gain[0]
-
+def test_another_branch_is_taken_when_it_was_better_for_long_enough(monkeypatch):
+    planner, better, looks = planner_of(), [False], []
+    monkeypatch.setattr(planner._tracker._solver, "better", lambda *_: looks.append(better[0]) or better[0])
     triggers = [said(planner, at(0)).trigger]
-    monkeypatch.setattr(solver, "branch", look)
-    for tick in range(1, 60):
-        gain[0] = 1.0 if len(looks) in (1, 4, 5) else 0.0  # for one look only, and later for two in a row
+    for tick in range(1, 80):
+        better[0] = len(looks) in (1, 2) or len(looks) >= 4  # for 0.2 s, and later for good
         triggers.append(said(planner, at(tick)).trigger)
-    looked = [tick for tick in range(1, 60) if triggers[tick] == "better branch"]
-    assert looks[:7] == [0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 1.0]  # the last one lays the new manifold
-    assert len(looked) == 1
+    taken = [tick for tick in range(1, 80) if triggers[tick] == "better branch"]
+    assert looks[:7] == [False, True, True, False, True, True, True]
+    first = taken[0] * PERIOD_S
+    assert first == pytest.approx(0.6 + 0.6 + 0.2 + 0.2 + 0.6 + 0.4)  # doubted at the fifth look, it looks every 0.2 s
+
+
+def test_a_branch_that_leads_the_same_way_is_no_other_one(monkeypatch):
+    planner, scenes = planner_of(), []
+    solver, pillar = planner._tracker._solver, Disc(2.0, 0.0, 0.2)
+    monkeypatch.setattr(solver, "better", lambda scene, *_: scenes.append(scene) or False)
+    for tick in range(14):
+        planner.plan(*routed(at(tick, (*WALLS, pillar))))
+    monkeypatch.undo()
+    followed = planner._tracker._offset_m
+    side = math.copysign(0.6, followed[np.argmax(np.abs(followed))])
+    for y, other in ((side, False), (-side, True)):
+        wanted = np.full(scenes[-1].end - solver.own, y)
+        monkeypatch.setattr(solver, "branch", lambda *_, wanted=wanted: (wanted, 1.0))
+        assert solver.better(scenes[-1], followed, 10) == other
+
+
+def test_a_station_has_room_before_the_robot_is_there_and_is_the_slower_to_get_it_the_farther_it_is():
+    planner = planner_of()
+    planner.plan(*routed(at(0)))
+    solver, away_m, period_s = planner._tracker._solver, np.full(21, 0.3), 0.05
+    scene = planner._scene(planner._chart, planner._field.update(at(1)), at(1), np.zeros(2))
+    step_m, arcs_m = solver._towards(away_m, scene), planner._stations.arcs_m
+    rest = (1.0 - step_m / away_m) ** (arcs_m / 0.4 / period_s)  # of what was missing, when the robot is there at 0.4 m/s
+    assert (rest[arcs_m > 0.5] < math.exp(-2.4)).all()
+    assert (np.diff(step_m[solver.own :]) <= 0.0).all()
+    assert step_m.max() == pytest.approx(0.5 * period_s)  # L
+    assert not solver._towards(np.array([-0.1, np.nan] * 10 + [0.0]), scene).any()
+
+
+def test_a_route_that_leaves_the_chart_for_a_moment_does_not_bend_it():
+    planner, xs = planner_of(), np.arange(0.0, 9.0, 0.05)
+    straight = np.stack((xs, 0.0 * xs), axis=1)
+    aside = np.stack((xs, 0.95 * np.sin(np.clip(xs, 0.0, 3.0) * math.pi / 3.0)), axis=1)
+    charts = []
+    for tick in range(60):
+        off = 10 <= tick < 20 or tick >= 30
+        planner.plan(at(tick), Route((9.0, 0.0), aside if off else straight, 9.0))
+        charts.append(planner._chart)
+    laid = [tick for tick in range(1, 60) if charts[tick] is not charts[tick - 1]]
+    assert laid[0] == 30 + round(planner.Settings().chart.escape_s / PERIOD_S)
 
 
 def test_without_continuation_every_tick_is_a_failure_to_continue():
@@ -121,9 +157,13 @@ def test_the_manifold_goes_around_what_stands_in_the_way_and_stays_in_the_box():
     assert drawn == {"centre_line", "manifold", "ridge", "box_left", "box_right", "tube_left", "tube_right"}
 
 
-def test_tracking_error_keeps_the_bound_on_a_moving_manifold():
-    """Proposition 2: |e| <= exp(-k t) |e0| + sup v / k, on a corridor that moves sideways."""
-    planner, gain, sideways = planner_of(), 4.0, 0.15
+@pytest.mark.parametrize("smooth", [False, True])
+def test_tracking_error_keeps_the_bound_on_a_moving_manifold(smooth):
+    """Proposition 2: |e| <= exp(-k t) |e0| + sup v / k, on a corridor that moves sideways.
+
+    With limited jerk j the robot drives towards it with at most (c j e^2)^(1/3): as fast as v from e = (v^3 / c j)^(1/2).
+    """
+    planner, gain, sideways = planner_of(smoothness={"enabled": smooth}), 4.0, 0.15
     pose, error0, worst = SE2(0.0, -0.2, 0.0), None, 0.0
     for tick in range(80):
         shift = sideways * tick * PERIOD_S
@@ -132,7 +172,9 @@ def test_tracking_error_keeps_the_bound_on_a_moving_manifold():
         told, twist = plan.diagnostics, plan.base
         worst = max(worst, told.bound_m) if tick > 1 else worst
         error0 = told.error_m if error0 is None else error0
-        assert told.error_m <= math.exp(-gain * tick * PERIOD_S) * error0 + worst + gain * PERIOD_S * worst + 0.01
+        speed = gain * worst
+        lasting = max(worst, math.sqrt(speed**3 / (APPROACH * 3.0))) if smooth else worst
+        assert told.error_m <= math.exp(-gain * tick * PERIOD_S) * error0 + lasting + PERIOD_S * speed + 0.01
         pose = pose.integrate(twist.vx, twist.vy, twist.wz, PERIOD_S)
 
 

@@ -117,11 +117,11 @@ def test_what_left_the_view_goes_on_for_a_moment_and_is_dropped_where_it_is_seen
     age = np.ones(field.known.shape, np.float32)
     walker, nobody = np.array([1.0, 0.5, -0.8, 0.2, 9.0]), np.zeros(5)
     memory = ClosingMemory(1.0)
-    for step in range(5):
-        memory.update(walker + np.array([0.08 * (4 - step), -0.02 * (4 - step), 0.0, 0.0, 0.0]), field, age, 0.1)
+    for step in range(-50, 1):
+        memory.update(walker + np.array([0.08 * -step, -0.02 * -step, 0.0, 0.0, 0.0]), field, age, 0.1)
     for step in range(1, 10):
         kept = memory.update(nobody, field, age, 0.1)
-        assert kept[:2] == pytest.approx([1.0 - 0.08 * step, 0.5 + 0.02 * step])
+        assert kept[:2] == pytest.approx([1.0 - 0.08 * step, 0.5 + 0.02 * step], abs=1e-3)
     assert not memory.update(nobody, field, age, 0.2).any()
     for _ in range(5):
         memory.update(walker, field, age, 0.1)
