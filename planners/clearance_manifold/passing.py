@@ -21,12 +21,16 @@ SIDE_S = 6.0  # so long before he passes a hand is chosen: from where who walks 
 FAR_M = 0.7  # so far from the line of who comes he is nobody's
 GAIN_M, ONLY_M = 0.4, 0.2  # the other hand must be better by this, and if only that one can still be got to
 BRANCH = 0.25  # of what a branch costs a station: where there is no room it is 5 m and more, and noise is 0.5 m
+ACROSS_S = 0.6  # so long what leads across the way of who comes along it counts: it is noise, or he turns back before the wall
 BOUND_FOR_S = 0.5  # so long a velocity across the way leads on before the robot could turn back
 STRAIGHT_ON_M = 0.2  # with a miss smaller than this somebody comes straight on
 
 
 class Passing:
-    """Chooses a hand when somebody begins to come, and keeps it unless the other is much better, or alone can be got to yet."""
+    """Chooses a hand when somebody begins to come, and when he turns along the way or across it.
+
+    In between it keeps it unless the other is much better, or alone can be got to yet.
+    """
 
     def __init__(self, solver: Solver, apart_m: float, speed_m_s: float) -> None:
         """Take what knows the branches, how far apart who passes is kept, and how fast the robot gets there."""
@@ -35,7 +39,7 @@ class Passing:
 
     def reset(self) -> None:
         """Nobody comes."""
-        self._hand = 0.0
+        self._hand, self._along = 0.0, False
 
     def warm_up(self) -> None:
         """Compile what a rehearsal in an empty corridor does not call."""
@@ -66,8 +70,9 @@ class Passing:
         along = runs_along(normal, scene.closing)
         goes_on = along or self._hand != 0.0  # towards who only begins to cross, it need not
         bound_for = scene.robot + BOUND_FOR_S * velocity if goes_on else scene.robot
-        miss_m = meeting(bound_for, scene.closing)[1]
-        gain_m = self._gain(miss_m, time_s)
+        miss_m = meeting(bound_for, _turned_along(scene.closing, normal, time_s) if along else scene.closing)[1]
+        gain_m = self._gain(miss_m, time_s) if along == self._along else 0.0  # who turns is somebody else
+        self._along = along
         if gain_m < math.inf:
             self._choose(scene, miss_m, gain_m, along=along)
         return self._hand, self._beside(scene, self._hand) if along else scene
@@ -106,11 +111,18 @@ class Passing:
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Return what is carried on, as named arrays."""
-        return {"hand": np.array(self._hand)}
+        return {"hand": np.array(self._hand), "along": np.array(self._along)}
 
     def take(self, state: dict[str, NDArray[Any]]) -> None:
         """Take over what `state` gave."""
-        self._hand = float(state["hand"])
+        self._hand, self._along = float(state["hand"]), bool(state["along"])
+
+
+def _turned_along(closing: F64, normal: F64, time_s: float) -> F64:
+    """Return who comes along a way with this normal, shape (2,): across it he is in `time_s` where he is after ACROSS_S."""
+    turned = closing.copy()
+    turned[2:4] -= max(0.0, 1.0 - ACROSS_S / max(time_s, ACROSS_S)) * float(normal @ closing[2:4]) * normal
+    return turned
 
 
 def meets(point: F64, normal: F64, closing: F64) -> bool:

@@ -42,6 +42,11 @@ def passing(left=0.0, right=0.0):
     return Passing(SimpleNamespace(own=0, least_m=LEAST_M, pays=pays), APART_M, SPEED_M_S)
 
 
+def holding(hand):
+    """Return the state of what has chosen a hand for somebody who comes along the way."""
+    return {"hand": np.array(hand), "along": np.array(True)}
+
+
 @pytest.mark.parametrize("yaw", [0.0, 0.7, -2.5])
 def test_when_and_on_which_hand_somebody_passes(yaw):
     """He comes from 2 m ahead at 0.5 m/s, 0.3 m to the robot's left, which is to the right of his way."""
@@ -122,11 +127,28 @@ def test_the_hand_that_the_robot_goes_to_is_kept_when_he_is_near(distance_m, goe
     assert (after == 1.0) is changes
 
 
+@pytest.mark.parametrize(("across_m_s", "hand"), [(-0.15, -1.0), (-0.2, 1.0)])
+def test_what_leads_across_the_way_of_who_comes_along_it_counts_for_a_while_only(across_m_s, hand):
+    """He is 3 m ahead, 0.1 m to the robot's left, and sways to its right: by 0.09 or 0.12 m in ACROSS_S, by 0.6 m in all."""
+    assert passing().update(scene_of(coming(3.0, 0.1, -0.7, across_m_s)), STANDS, begins=True)[0] == hand
+
+
+def test_for_who_turns_the_hand_is_chosen_anew():
+    """Who crosses in front of the robot is passed behind; then he turns along the way, 0.3 m on that hand."""
+    chooses = passing()
+    crossing, _ = chooses.update(scene_of(coming(1.5, 0.8, -0.5, -0.5)), STANDS, begins=True)
+    assert crossing == 1.0
+    assert chooses.update(scene_of(coming(1.0, 0.15, -0.7, -0.05)), STANDS, begins=False)[0] == -1.0
+    kept = passing()
+    kept.take(holding(1.0))
+    assert kept.update(scene_of(coming(1.0, 0.15, -0.7, -0.05)), STANDS, begins=False)[0] == 1.0
+
+
 @pytest.mark.parametrize(("goes_m_s", "changes"), [(0.0, True), (0.3, False)])
 def test_a_hand_that_cannot_be_got_to_any_more_is_left_for_one_that_can(goes_m_s, changes):
     """He is there after 1.5 s, 0.2 m on the other hand; it stands, or already goes where he has his hand."""
     chooses = passing()
-    chooses.take({"hand": np.array(1.0)})
+    chooses.take(holding(1.0))
     hand, _ = chooses.update(scene_of(coming(1.5, 0.2, -1.0, 0.0)), np.array([0.0, goes_m_s]), begins=False)
     assert (hand == -1.0) is changes
 
@@ -135,10 +157,10 @@ def test_a_hand_that_leads_nowhere_is_changed_for_the_one_that_does_and_not_for_
     straight_on = scene_of(coming(2.4, 0.0, -0.5, 0.0))
     for better, hand in ((passing(left=0.0, right=5.0), 1.0), (passing(left=5.0, right=0.0), -1.0)):
         assert better.update(straight_on, STANDS, begins=True)[0] == hand
-        better.take({"hand": np.array(-hand)})
+        better.take(holding(-hand))
         assert better.update(straight_on, STANDS, begins=False)[0] == hand
     hardly = passing(left=0.0, right=0.2)
-    hardly.take({"hand": np.array(-1.0)})
+    hardly.take(holding(-1.0))
     assert hardly.update(straight_on, STANDS, begins=False)[0] == -1.0
 
 
@@ -164,14 +186,14 @@ def test_who_crosses_straight_on_is_passed_behind(left):
 @pytest.mark.parametrize("closing", [NOBODY, coming(-0.6, 0.1, -1.0, 0.0), coming(3.0, 0.0, -0.4, 0.0)], ids=["", "past", "late"])
 def test_nobody_who_comes_leaves_no_hand(closing):
     chooses, scene = passing(), scene_of(closing)
-    chooses.take({"hand": np.array(1.0)})
+    chooses.take(holding(1.0))
     assert chooses.update(scene, STANDS, begins=False) == (0.0, scene)
     assert chooses.state()["hand"] == 0.0
 
 
 def test_somebody_else_begins_anew():
     chooses = passing()
-    chooses.take({"hand": np.array(1.0)})
+    chooses.take(holding(1.0))
     near = scene_of(coming(0.7, 0.1, -1.0, 0.0))
     assert chooses.update(near, STANDS, begins=False)[0] == 1.0
     assert chooses.update(near, STANDS, begins=True)[0] == -1.0
