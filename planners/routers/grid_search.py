@@ -80,6 +80,9 @@ def way_to(target: tuple[int, int], reached: F64, cost: F64, cell_m: float) -> I
     """Return the cells (row, column) of the cheapest way to a cell that is reached, the start first, shape (n, 2).
 
     Back from the target, each time to the neighbour that led there; of two that did, to the one that was nearer to the start.
+
+    Raises:
+        ValueError: no neighbour led to a cell: the target is not reached, or `reached` is not of this cost.
     """
     rows, columns = cost.shape
     straight, diagonal = _half_lengths(cell_m)
@@ -94,6 +97,8 @@ def way_to(target: tuple[int, int], reached: F64, cost: F64, cell_m: float) -> I
                 half_length = straight if r == middle_row or c == middle_column else diagonal
                 if reached[r, c] < least and reached[r, c] + (cost[r, c] + price) * half_length == here:
                     least, row, column = reached[r, c], r, c
+        if least == np.inf:
+            raise ValueError("no neighbour led here")
         count += 1
         way[count] = row, column
     return way[: count + 1][::-1].copy()

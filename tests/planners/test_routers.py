@@ -62,6 +62,15 @@ def test_search_agrees_with_plain_relaxation(seed):
     assert total == pytest.approx(reached[target])
 
 
+def test_there_is_no_way_back_from_what_is_not_reached():
+    cost = np.ones((5, 5))
+    cost[:, 2] = np.inf
+    reached = cheapest(cost, (0, 0), 0.1)
+    for target, of in (((4, 4), cost), ((4, 1), 2.0 * cost)):
+        with pytest.raises(ValueError, match="no neighbour led here"):
+            way_to(target, reached, of, 0.1)
+
+
 @pytest.mark.parametrize("seed", range(30))
 def test_remainder_is_the_shortest_way_round_the_window(seed):
     rng = np.random.default_rng(seed)
