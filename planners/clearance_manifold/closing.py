@@ -20,7 +20,6 @@ FREE_AROUND_M = 0.45  # a place in view with so much clearance is nobody's
 SURE_S = 0.3  # what was seen to close in for less is the noise of a rate
 SURE = 2.0  # and so is a velocity of less than so many standard deviations: a wall seen while turning has rates, too,
 MOVED_M = 0.4  # unless it has come so far
-PART = 0.5  # of the cells that were seen: what is left of who leaves the view has another middle
 FIRST = 0.5  # share of the velocity that the first rates of something new give: what comes into view has any rate
 MIDDLE_M = 0.08  # noise of a boundary's middle
 RATE_M_S = 0.5  # and of the velocity that its rates give,
@@ -61,8 +60,7 @@ class ClosingMemory:
         """
         self._kept[:2] += elapsed_s * self._kept[2:4]
         same = min(found[4], self._kept[4]) > 0.0 and np.hypot(*(found[:2] - self._kept[:2])) < SAME_M
-        known = found[4] >= PART * self._kept[4] if same else not self._nearer(found, robot)
-        if found[4] > 0.0 and (known or not self._goes_on(field, age_s, elapsed_s)):
+        if found[4] > 0.0 and (same or not self._nearer(found, robot) or not self._goes_on(field, age_s, elapsed_s)):
             found = np.concatenate((found[:2], _walked(found[2:4]), found[4:]))
             if same:
                 self._weigh(found, elapsed_s)
