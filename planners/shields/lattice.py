@@ -62,7 +62,7 @@ class LatticeShield:
         s, base = settings, settings.lattice
         step_s, after_step_s = s.horizon_s / s.steps, s.after_s / s.after_steps
         self._answer = Answer(acceleration, base.latency_s, base.response_s, step_s, s.steps, after_step_s, s.after_steps)
-        (self._times_s, self._looks), self._resters = times_of(self._answer), Resters(s.patience_s)
+        (self._times_s, self._looks), self._resters = times_of(self._answer), Resters(s.patience_s, s.steady_s)
 
     @property
     def kept_clear_m(self) -> float:

@@ -18,7 +18,6 @@ from estimators.field_query import sample
 from planners.static_field import GRID_M, STILL_M_S
 
 SECOND_NS = 1_000_000_000
-STEADY_S = 0.5  # time constant of the velocity that counts: a track that sees another side of somebody jumps for a look or two
 CAME_M = 0.3  # from where it was first seen; what stands, and is seen from here and from there, shifts by less
 SLOWED = 0.7  # of the velocity that it came with
 _EXACT = frozen_array(np.zeros((4, 4)))
@@ -41,9 +40,9 @@ class _Way:
 class Resters:
     """Remembers of every track how it came."""
 
-    def __init__(self, patience_s: float) -> None:
-        """Who has not gone on for `patience_s` stays."""
-        self._patience_ns = round(patience_s * SECOND_NS)
+    def __init__(self, patience_s: float, steady_s: float) -> None:
+        """Who has not gone on for `patience_s` stays; velocities count smoothed, with the time constant `steady_s`."""
+        self._patience_ns, self._steady_ns = round(patience_s * SECOND_NS), steady_s * SECOND_NS
         self._ways: dict[int, _Way] = {}
         self._stamp_ns = 0  # of the belief before
 
@@ -76,7 +75,7 @@ class Resters:
         before = self._ways.get(track.identity)
         if before is None:
             return _Way(here, False, now, now, now_ns, here, radius_m, False)
-        share = 1.0 - math.exp((self._stamp_ns - now_ns) / (STEADY_S * SECOND_NS))
+        share = 1.0 - math.exp((self._stamp_ns - now_ns) / self._steady_ns) if self._steady_ns > 0.0 else 1.0
         steady = before.steady[0] + share * (now[0] - before.steady[0]), before.steady[1] + share * (now[1] - before.steady[1])
         least_m_s, speed_m_s = SLOWED * math.hypot(*before.velocity), math.hypot(*now)
         came = before.came or math.dist(here, before.origin) > CAME_M

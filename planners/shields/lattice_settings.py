@@ -30,4 +30,10 @@ class LatticeShieldSettings(Settings):
     after_s: float = Field(default=1.2, gt=0.0, le=10.0, description="going on, or a stop, has to keep clear for so long then")
     after_steps: int = Field(default=6, ge=1, le=100)
     patience_s: float = Field(default=4.0, ge=0.0, le=60.0, description="who came and stands may set off again for so long")
+    steady_s: float = Field(
+        default=0.5,
+        ge=0.0,
+        le=5.0,
+        description="time constant that his velocity is smoothed with: who is seen from another side jumps for a look or two",
+    )
     lattice: FilterLatticeSettings = FilterLatticeSettings()
