@@ -18,8 +18,7 @@ from estimators.field_query import sample
 
 FREE_AROUND_M = 0.45  # a place in view with so much clearance is nobody's
 SURE_S = 0.3  # what was seen to close in for less is the noise of a rate
-SURE = 2.0  # and so is a velocity of less than so many standard deviations: a wall seen while turning has rates, too,
-MOVED_M = 0.4  # unless it has come so far
+SURE = 2.0  # and so is a velocity of less than so many standard deviations: a wall seen while turning has rates, too
 FIRST = 0.5  # share of the velocity that the first rates of something new give: what comes into view has any rate
 MIDDLE_M = 0.08  # noise of a boundary's middle
 RATE_M_S = 0.5  # and of the velocity that its rates give,
@@ -38,7 +37,6 @@ class ClosingMemory:
         self._carry_s = carry_s
         self._kept: F64 = np.zeros(5)  # as `nearest_closing` gives it
         self._spread: F64 = np.zeros(3)  # variance of its place, covariance with its velocity, and that one's variance
-        self._origin: F64 = np.zeros(2)  # where it was first seen
         self._seen_s, self._unseen_s = 0.0, 0.0
 
     @property
@@ -46,49 +44,35 @@ class ClosingMemory:
         """Whether what closes in is another than at the time before."""
         return self._seen_s == 0.0
 
-    def update(self, found: F64, field: ClearanceField, age_s: F32, elapsed_s: float, robot: F64) -> F64:
+    def update(self, found: F64, field: ClearanceField, age_s: F32, elapsed_s: float) -> F64:
         """Return what closes in: what is seen to, or where what was seen to must be by now; shape (5,).
-
-        Who is out of view beside the robot is not forgotten for somebody further away.
 
         Args:
             found: what is seen to, shape (5,); its last element is 0 where nothing does.
             field: the clearance now.
             age_s: since each of its cells was looked at, shape (rows, columns).
             elapsed_s: since the last time.
-            robot: in odom, shape (2,).
         """
         self._kept[:2] += elapsed_s * self._kept[2:4]
-        same = min(found[4], self._kept[4]) > 0.0 and np.hypot(*(found[:2] - self._kept[:2])) < SAME_M
-        if found[4] > 0.0 and (same or not self._nearer(found, robot) or not self._goes_on(field, age_s, elapsed_s)):
+        if found[4] > 0.0:
             found = np.concatenate((found[:2], _walked(found[2:4]), found[4:]))
+            same = self._kept[4] > 0.0 and np.hypot(*(found[:2] - self._kept[:2])) < SAME_M
             if same:
                 self._weigh(found, elapsed_s)
             else:
                 self._kept, self._spread = found.copy(), np.array([MIDDLE_M**2, 0.0, FIRST * RATE_M_S**2])
                 self._kept[2:4] *= FIRST
-                self._origin = found[:2].copy()
             self._seen_s = self._seen_s + elapsed_s if same else 0.0
             self._unseen_s = 0.0
             return self._kept.copy() if np.hypot(*self._kept[2:4]) > STILL_M_S else np.zeros(5)
-        if not self._goes_on(field, age_s, elapsed_s):
-            self._kept, self._seen_s, self._unseen_s = np.zeros(5), 0.0, 0.0
-            return self._kept.copy()
         self._unseen_s += elapsed_s
-        return self._kept.copy()
-
-    def _nearer(self, found: F64, robot: F64) -> bool:
-        """Return whether what is kept is nearer to the robot than what is found."""
-        return self._kept[4] > 0.0 and bool(np.hypot(*(self._kept[:2] - robot)) < np.hypot(*(found[:2] - robot)))
-
-    def _goes_on(self, field: ClearanceField, age_s: F32, elapsed_s: float) -> bool:
-        """Return whether what is not seen to close in still does: it was surely seen to, lately, and its place is not free."""
         there = self._kept[None, :2]
         seen = float(sample(age_s, field.lattice, there)[0]) == 0.0
         free = float(sample(field.clearance_m, field.lattice, there)[0]) > FREE_AROUND_M
-        moves = float(np.hypot(*self._kept[2:4])) >= SURE * math.sqrt(self._spread[2])
-        sure = self._seen_s >= SURE_S and (moves or float(np.hypot(*(self._kept[:2] - self._origin))) > MOVED_M)
-        return sure and self._unseen_s + elapsed_s <= self._carry_s and not (seen and free)
+        unsure = self._seen_s < SURE_S or float(np.hypot(*self._kept[2:4])) < SURE * math.sqrt(self._spread[2])
+        if unsure or self._unseen_s > self._carry_s or (seen and free):
+            self._kept, self._seen_s = np.zeros(5), 0.0
+        return self._kept.copy()
 
     def _weigh(self, found: F64, elapsed_s: float) -> None:
         """Correct position and velocity, which the same gains hold for in x and y, by what is seen now."""
@@ -109,14 +93,13 @@ class ClosingMemory:
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Return what is carried on, as named arrays."""
-        return {"closing": np.concatenate((self._kept, self._spread, self._origin, (self._seen_s, self._unseen_s)))}
+        return {"closing": np.concatenate((self._kept, self._spread, (self._seen_s, self._unseen_s)))}
 
     def take(self, state: dict[str, NDArray[Any]]) -> None:
         """Take over what `state` gave."""
         self._kept = state["closing"][:5].copy()
         self._spread = state["closing"][5:8].copy()
-        self._origin = state["closing"][8:10].copy()
-        self._seen_s, self._unseen_s = state["closing"][10:].tolist()
+        self._seen_s, self._unseen_s = state["closing"][8:].tolist()
 
 
 def _walked(velocity: F64) -> F64:

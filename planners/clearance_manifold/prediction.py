@@ -67,7 +67,7 @@ class ArrivalField:
         closing = nearest_closing(field.clearance_m, field.rate_m_s, recent, corner, cell_m, robot, CLOSING_M_S)
         if closing[4] < LEAST_CELLS:
             closing[4] = 0.0
-        closing = self._closing.update(closing, field, self._met_s, elapsed_s, robot)
+        closing = self._closing.update(closing, field, self._met_s, elapsed_s)
         return Predicted(lowered(field.clearance_m, taken, cell_m), closing, self._closing.begins)
 
     @property
