@@ -6,7 +6,6 @@ pickled `Task` through the lifeline, a socket whose end of file says that the ru
 
 from __future__ import annotations
 
-import ctypes
 import faulthandler
 import importlib
 import os
@@ -25,12 +24,12 @@ from drivers.interface.errors import TrundleError
 from drivers.io.backoff import Backoff, BackoffSettings
 from drivers.io.channels import Channels, MemorySpec
 from drivers.io.last_hop import LastHop
+from drivers.io.parent import end_with_parent
 from drivers.io.session import Port, Session
 
 PUBLISH_NS = 50_000_000  # health goes out at least this often, and at every change of state
 HEARTBEAT_S = 0.1  # no wait is longer
 LAST_WORDS_S = 2.0  # for rest and close when the runtime is gone; then it ends, whatever hangs
-_PR_SET_PDEATHSIG = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +174,7 @@ def main(lifeline_fd: int, memory_fd: int, bell_fd: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the runtime's; it tells us
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)  # until there is something to bring to rest
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)  # should the lifeline have leaked into another process
+    end_with_parent()  # should the lifeline have leaked into another process
     lifeline = socket.socket(fileno=lifeline_fd)
     task = _receive(lifeline)
     if task is None:

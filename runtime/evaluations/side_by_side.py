@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import gc
 import os
+import sys
 from collections.abc import Callable, Hashable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from typing import TypeVar
 
+from drivers.io.parent import end_with_parent
 from runtime.evaluations.journal import Journal
 
 C = TypeVar("C", bound=Hashable)
@@ -53,7 +55,7 @@ def _each(todo: tuple[C, ...], work: Callable[[C], R], jobs: int) -> Iterator[tu
         yield from ((case, work(case)) for case in todo)
         return
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # one core a process: more threads would only push each other aside
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_on_one_core) as pool:
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_begin) as pool:
         futures = {pool.submit(work, case): case for case in todo}
         try:
             for future in as_completed(futures):
@@ -61,6 +63,15 @@ def _each(todo: tuple[C, ...], work: Callable[[C], R], jobs: int) -> Iterator[tu
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
+
+
+def _begin() -> None:
+    """End when the evaluation is killed, instead of running on with nobody to take the result; and keep to one core."""
+    end_with_parent()
+    started_by = parent_process()
+    if started_by is None or not started_by.is_alive():
+        sys.exit("the evaluation ended before its worker began")
+    _on_one_core()
 
 
 def _on_one_core() -> None:
