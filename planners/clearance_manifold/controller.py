@@ -15,7 +15,7 @@ from planners.clearance_manifold.control_kernels import brakable, known_way, lon
 from planners.clearance_manifold.differential import Differential
 from planners.clearance_manifold.governor import Around, Governor, Motion, approach
 from planners.clearance_manifold.governor_kernels import room_along, time_to_pass
-from planners.clearance_manifold.passing_kernels import give_way
+from planners.clearance_manifold.passing_kernels import give_way, meeting
 from planners.clearance_manifold.settings import ControllerSettings
 from planners.point_ds.kernels import within
 
@@ -44,8 +44,8 @@ class Situation:
     feasible: bool
     robot: F64  # (2,), the point that is controlled, in odom
     velocity: F64  # (2,), of the base, in odom
-    closing: F64  # (5,), what closes in,
-    hand: float  # and on which hand it passes (`Passing`)
+    closing: F64  # (n, 5), what closes in,
+    hands: F64  # (n,), and on which hand it passes (`Passing`)
     behind_m: float = 0.0  # how far a base that cannot strafe may back off
     stale: bool = False  # nobody has looked at the ground right before it for long
 
@@ -76,7 +76,7 @@ class ManifoldController:
         """Return the twist and the speed along the manifold."""
         cap = self._limits.velocity
         body = SE2(0.0, 0.0, -yaw)
-        pass_s = time_to_pass(at.robot, at.closing, NEAR_M) - LEAD_S
+        pass_s = min(time_to_pass(at.robot, who, NEAR_M) for who in at.closing) - LEAD_S
         least_m_s3 = self._governor.pressing(float(np.hypot(*at.error)), pass_s)
         push, tangent, speed = body.apply(self._push(at.error, least_m_s3)), body.apply(at.tangent), self.speed(at)
         if at.feasible and speed + float(push @ tangent) < self._settings.progress_m_s:
@@ -123,8 +123,15 @@ class ManifoldController:
         return float(brakable(free_m, self._settings.deceleration_m_s2, self._delay_s))
 
     def _yielding(self, u: F64, at: Situation) -> F64:
-        """Return the velocity, shape (2,), in odom, changed so that what closes in passes at a distance."""
-        return np.asarray(give_way(u, at.robot, at.closing, self.apart_m, self._settings.yield_horizon_s, at.hand))
+        """Return the velocity, shape (2,), in odom, changed so that what closes in passes at a distance.
+
+        Projected in turn onto what each of them leaves, and last onto what who passes first does.
+        """
+        come = [(meeting(at.robot, who)[0], who, hand) for who, hand in zip(at.closing, at.hands, strict=True) if hand != 0.0]
+        come.sort(key=lambda one: -one[0])
+        for _, who, hand in come * len(come):
+            u = np.asarray(give_way(u, at.robot, who, self.apart_m, self._settings.yield_horizon_s, hand))
+        return u
 
     def reset(self) -> None:
         """Stand."""

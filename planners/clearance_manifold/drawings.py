@@ -19,7 +19,7 @@ def drawn(scene: Scene, manifold: Manifold, tube_m: float, closing: F64, look_at
         scene: what the manifold is laid through.
         manifold: the manifold.
         tube_m: radius of the tube that its stations are searched in.
-        closing: what closes in, shape (5,).
+        closing: what closes in, shape (n, 5).
         look_at: what is turned to, shape (2,), in odom.
     """
     ahead = manifold.ahead
@@ -34,8 +34,7 @@ def drawn(scene: Scene, manifold: Manifold, tube_m: float, closing: F64, look_at
         Drawing("tube_right", at + (offset - tube_m) * normal),
         Drawing("tube_left", at + (offset + tube_m) * normal),
     ]
-    if closing[4] > 0.0:
-        lines.append(Drawing("closing", np.stack((closing[:2], closing[:2] + AHEAD_S * closing[2:4]))))
+    lines.extend(Drawing("closing", np.stack((who[:2], who[:2] + AHEAD_S * who[2:4]))) for who in closing[closing[:, 4] > 0.0])
     if look_at is not None:
         lines.append(Drawing("looked_at", look_at[None], connected=False))
     return tuple(lines)

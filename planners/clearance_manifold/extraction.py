@@ -44,7 +44,7 @@ class Scene:
     robot: F64  # (2,), in odom
     end: int  # stations from here on lie beyond the goal and ask for nothing
     speed_m_s: float  # the fastest that the robot arrives with
-    closing: F64  # (5,), what closes in (`nearest_closing`)
+    closing: F64  # (SLOTS, 5), what closes in (`nearest_closing`), 0 cells where nothing does
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +117,10 @@ class Solver:
     def _costs(self, scene: Scene) -> F64:
         """Return the costs of all stations ahead and offsets, shape (n, m)."""
         ahead = Sections(*(part[self._stations.own : scene.end] for part in scene.sections))
-        apart = encounters(ahead, self._offsets, scene.robot, scene.speed_m_s, ENCOUNTER_S, scene.closing)
+        come = scene.closing[scene.closing[:, 4] > 0.0]
+        apart = np.full((len(ahead.at), len(self._offsets)), np.inf)
+        for who in come:
+            np.minimum(apart, encounters(ahead, self._offsets, scene.robot, scene.speed_m_s, ENCOUNTER_S, who), out=apart)
         return np.asarray(station_costs(profiles(scene.ground, ahead, self._offsets), apart, self._offsets, self._demand))
 
     def pays(self, scene: Scene) -> float:
@@ -175,7 +178,7 @@ class Solver:
 
         What is far ahead has time: noise there moves the manifold little, and a better view corrects it.
         """
-        meet_m_s = scene.speed_m_s + float(np.hypot(*scene.closing[2:4]))
+        meet_m_s = scene.speed_m_s + float(np.hypot(scene.closing[:, 2], scene.closing[:, 3]).max())
         within_s = np.maximum(IN_TIME / meet_m_s * np.abs(self._stations.arcs_m), SOONEST_S)
         return np.asarray(np.fmin(np.fmax(away_m, 0.0) * (self._period_s / within_s), self._step_towards_m))
 

@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.belief import F64
+from estimators.belief import F64, Mask
+from planners.clearance_manifold.branch_kernels import encounters
+from planners.clearance_manifold.closing import SLOTS
 from planners.clearance_manifold.extraction import Scene, Solver
-from planners.clearance_manifold.passing_kernels import ABREAST_M, left_to, meeting, runs_along
+from planners.clearance_manifold.passing_kernels import ABREAST_M, give_way, left_to, meeting, runs_along
 from planners.clearance_manifold.ridge_kernels import Sections
 
 SIDE_S = 6.0  # so long before he passes a hand is chosen: from where who walks slowly comes into view
@@ -39,7 +41,7 @@ class Passing:
 
     def reset(self) -> None:
         """Nobody comes."""
-        self._hand, self._along = 0.0, False
+        self._hands, self._along = np.zeros(SLOTS), np.zeros(SLOTS, np.bool_)
 
     def warm_up(self) -> None:
         """Compile what a rehearsal in an empty corridor does not call."""
@@ -49,73 +51,81 @@ class Passing:
         )
         meets(np.zeros(2), sections.normal[0], closing)
         left_to(1.0, sections, 0, np.zeros(2), 1.0, closing, 0.1)
+        give_way(np.zeros(2), np.zeros(2), closing, 0.1, 1.0, 1.0)
+        encounters(sections, np.zeros(1), np.zeros(2), 1.0, 1.0, closing)
 
-    def update(self, scene: Scene, velocity: F64, *, begins: bool) -> tuple[float, Scene]:
-        """Return the hand on which what closes in passes, and the scene with what that leaves of it.
+    def update(self, scene: Scene, velocity: F64, begins: Mask) -> tuple[F64, Scene]:
+        """Return the hands on which what closes in passes, shape (SLOTS,), and the scene with what that leaves of it.
+
+        Who passes first has the first choice: the others choose in what he leaves.
 
         The hand is seen along the way of who comes: 1 left of the robot, -1 right of it, 0: nobody comes.
 
         Args:
             scene: what a manifold is laid through.
             velocity: of the base, in odom, shape (2,).
-            begins: whether this is somebody else than at the tick before.
+            begins: whether what is in a slot is somebody else than at the tick before, shape (SLOTS,).
         """
-        normal = scene.sections.normal[self._solver.own]
-        time_s = meeting(scene.robot, scene.closing)[0]
-        comes = time_s < SIDE_S and time_s * float(np.hypot(*scene.closing[2:4])) > -ABREAST_M
-        if begins or not comes:
-            self._hand = 0.0
-        if not comes:
-            return 0.0, scene
-        along = runs_along(normal, scene.closing)
-        goes_on = along or self._hand != 0.0  # towards who only begins to cross, it need not
-        bound_for = scene.robot + BOUND_FOR_S * velocity if goes_on else scene.robot
-        miss_m = meeting(bound_for, _turned_along(scene.closing, normal, time_s) if along else scene.closing)[1]
-        gain_m = self._gain(miss_m, time_s) if along == self._along else 0.0  # who turns is somebody else
-        self._along = along
-        if gain_m < math.inf:
-            self._choose(scene, miss_m, gain_m, along=along)
-        return self._hand, self._beside(scene, self._hand) if along else scene
+        self._hands[begins] = 0.0
+        times_s = np.array([meeting(scene.robot, who)[0] for who in scene.closing])
+        comes = (times_s < SIDE_S) & (times_s * np.hypot(scene.closing[:, 2], scene.closing[:, 3]) > -ABREAST_M)
+        self._hands[~comes] = 0.0
+        for slot in sorted(np.flatnonzero(comes).tolist(), key=lambda slot: times_s[slot]):
+            scene = self._passes(scene, velocity, slot, float(times_s[slot]))
+        return self._hands.copy(), scene
 
-    def _gain(self, miss_m: float, time_s: float) -> float:
+    def _passes(self, scene: Scene, velocity: F64, slot: int, time_s: float) -> Scene:
+        """Choose the hand of who passes in `time_s`, or keep it; return what he leaves of the scene."""
+        normal, who = scene.sections.normal[self._solver.own], scene.closing[slot]
+        along = runs_along(normal, who)
+        goes_on = along or self._hands[slot] != 0.0  # towards who only begins to cross, it need not
+        bound_for = scene.robot + BOUND_FOR_S * velocity if goes_on else scene.robot
+        miss_m = meeting(bound_for, _turned_along(who, normal, time_s) if along else who)[1]
+        gain_m = self._gain(slot, miss_m, time_s) if along == self._along[slot] else 0.0  # who turns is somebody else
+        self._along[slot] = along
+        if gain_m < math.inf:
+            self._choose(scene, slot, miss_m, gain_m, along=along)
+        return self._beside(scene, who, self._hands[slot]) if along else scene
+
+    def _gain(self, slot: int, miss_m: float, time_s: float) -> float:
         """Return by how much the other hand must be better [m].
 
         By less where only that one can be got to before he passes, from where the robot is bound for; infinitely where only
         this one can.
         """
-        if self._hand == 0.0:
+        if self._hands[slot] == 0.0:
             return -math.inf
         reach_m = self._speed_m_s * max(0.0, time_s - BOUND_FOR_S)
-        this, other = (self._apart_m - hand * miss_m <= reach_m for hand in (self._hand, -self._hand))
+        this, other = (self._apart_m - hand * miss_m <= reach_m for hand in (self._hands[slot], -self._hands[slot]))
         if this == other:
             return GAIN_M
         return math.inf if this else ONLY_M
 
-    def _choose(self, scene: Scene, miss_m: float, gain_m: float, *, along: bool) -> None:
+    def _choose(self, scene: Scene, slot: int, miss_m: float, gain_m: float, *, along: bool) -> None:
         """Take the hand with the shorter way aside and, of who comes along the way, the better branch, if it is by that much."""
-        burdens = {hand: max(0.0, self._apart_m - hand * miss_m) for hand in (-1.0, 1.0)}
+        who, burdens = scene.closing[slot], {hand: max(0.0, self._apart_m - hand * miss_m) for hand in (-1.0, 1.0)}
         if along:
-            burdens = {hand: m + BRANCH * self._solver.pays(self._beside(scene, hand)) for hand, m in burdens.items()}
-        elif self._hand == 0.0 and abs(miss_m) < STRAIGHT_ON_M:  # who crosses is passed behind
-            normal, (x, y) = scene.sections.normal[self._solver.own], scene.closing[2:4]
+            burdens = {hand: m + BRANCH * self._solver.pays(self._beside(scene, who, hand)) for hand, m in burdens.items()}
+        elif self._hands[slot] == 0.0 and abs(miss_m) < STRAIGHT_ON_M:  # who crosses is passed behind
+            normal, (x, y) = scene.sections.normal[self._solver.own], who[2:4]
             burdens = {hand: -hand * float(normal @ (x, y)) * float(normal @ (-y, x)) for hand in burdens}
         better = min(burdens, key=lambda hand: burdens[hand])
-        if burdens.get(self._hand, math.inf) - burdens[better] > gain_m:
-            self._hand = better
+        if burdens.get(float(self._hands[slot]), math.inf) - burdens[better] > gain_m:
+            self._hands[slot] = better
 
-    def _beside(self, scene: Scene, hand: float) -> Scene:
-        """Return what who comes along the way leaves of a scene on the robot's hand of him."""
+    def _beside(self, scene: Scene, who: F64, hand: float) -> Scene:
+        """Return what who comes along the way, shape (5,), leaves of a scene on the robot's hand of him."""
         own, least_m = self._solver.own, self._solver.least_m
-        reach = left_to(hand, scene.sections, own, scene.robot, scene.speed_m_s, scene.closing, least_m)
+        reach = left_to(hand, scene.sections, own, scene.robot, scene.speed_m_s, who, least_m)
         return replace(scene, sections=scene.sections._replace(reach=reach))
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Return what is carried on, as named arrays."""
-        return {"hand": np.array(self._hand), "along": np.array(self._along)}
+        return {"hands": self._hands.copy(), "along": self._along.copy()}
 
     def take(self, state: dict[str, NDArray[Any]]) -> None:
         """Take over what `state` gave."""
-        self._hand, self._along = float(state["hand"]), bool(state["along"])
+        self._hands, self._along = state["hands"].copy(), state["along"].copy()
 
 
 def _turned_along(closing: F64, normal: F64, time_s: float) -> F64:

@@ -7,6 +7,7 @@ Egocentric Sensing.  README.md beside this file says what differs and why.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -85,36 +86,55 @@ class ClearanceManifold:
         predicted = self._field.update(belief)
         reason = self._refusal(belief, route)
         if reason:
-            return self._wait(belief, reason, blocked=route.blocked)
+            return self._wait(belief, predicted, route, reason)
         self._waiting.over()
         pose = belief.odom_from_base
         point = self._control_point(pose)
         new_goal = self._follow_route(route, point, predicted.closing, belief.stamp_ns)
         assert self._chart is not None
         scene = self._scene(self._chart, predicted, belief, point)
-        hand, scene = self._passing.update(scene, _velocity(belief), begins=predicted.begins)
+        hands, scene = self._passing.update(scene, _velocity(belief), predicted.begins)
         told = self._tracker.advance(scene, belief, new_goal)
         outlook = self._outlook(scene, told, belief)
         left_m = self._chart.length_m - self._arc_m
         situation = self._reader.situation(
-            told.manifold, belief, point, left_m, predicted.closing, hand, outlook, self._field.met_s
+            told.manifold, belief, point, left_m, predicted.closing, hands, outlook, self._field.met_s
         )
         around = Around(scene.ground, belief.clearance.known, self._solver.least_m, self._settings.controller.body_m)
         twist, speed = self._controller.command(situation, pose.yaw, around)
         return self._plan(scene, told, situation, outlook, (twist, speed))
 
-    def _wait(self, belief: Belief, reason: str, *, blocked: bool) -> Plan:
-        """Stand; where the way is blocked, look whether it still is."""
+    def _wait(self, belief: Belief, predicted: Predicted, route: Route, reason: str) -> Plan:
+        """Stand; where the way is blocked, look whether it still is, and make way for who comes along the last one."""
         self._tracker.reset()
-        self._passing.reset()
         self._lookout.reset()
-        self._controller.reset()
-        diagnostics = ManifoldDiagnostics(fallback_category="", stopped=reason)
-        if not blocked or self._chart is None:
+        blocked, s = route.blocked and self._chart is not None, self._settings
+        come, twist = np.zeros((0, 5)), BodyTwist()
+        if blocked and route.goal_in_odom is not None and s.waiting.blocked == "make_way":
+            come, twist = self._make_way(belief, predicted)
+        if not len(come):
+            self._controller.reset()
+        if not blocked:
+            self._passing.reset()
             self._chart = None
-            return Plan(BodyTwist(), diagnostics=diagnostics)
-        twist = self._waiting.twist(self._chart, self._arc_m, self._settings.solver.horizon_m, self._solver.least_m, belief)
-        return Plan(twist, diagnostics=diagnostics)
+        if self._chart is not None:
+            wz = self._waiting.turn(self._chart, self._arc_m, s.solver.horizon_m, self._solver.least_m, belief, come)
+            twist = replace(twist, wz=wz)
+        return Plan(twist, diagnostics=ManifoldDiagnostics(fallback_category="", stopped=reason))
+
+    def _make_way(self, belief: Belief, predicted: Predicted) -> tuple[F64, BodyTwist]:
+        """Return who comes along the last way or across it, shape (n, 5), and the twist that gives way to them."""
+        assert self._chart is not None
+        pose = belief.odom_from_base
+        point = self._control_point(pose)
+        self._arc_m = float(self._chart.project(point[None], self._arc_m)[0, 0])
+        scene = self._scene(self._chart, predicted, belief, point)
+        hands, scene = self._passing.update(scene, _velocity(belief), predicted.begins)
+        if not hands.any():
+            return np.zeros((0, 5)), BodyTwist()
+        around = Around(scene.ground, belief.clearance.known, self._solver.least_m, self._settings.controller.body_m)
+        twist, _ = self._controller.command(self._reader.standing(scene, belief, hands), pose.yaw, around)
+        return scene.closing[hands != 0.0], twist
 
     def _refusal(self, belief: Belief, route: Route) -> str:
         """Return why there is nothing to do, or nothing."""
@@ -136,7 +156,7 @@ class ClearanceManifold:
     def _follow_route(self, route: Route, point: F64, closing: F64, stamp_ns: int) -> bool:
         """Keep the chart, or lay a new one where the route left it; return whether the goal is another.
 
-        The route leads around who comes along the way, shape (5,), as if he stood, now on one side of him and now on the other.
+        The route leads around who comes along the way, shape (n, 5), as if he stood, now on one side of him and now on the other.
         """
         assert route.goal_in_odom is not None
         goal = np.array(route.goal_in_odom)
@@ -144,7 +164,7 @@ class ClearanceManifold:
         if self._chart is not None and moved_m < self._settings.chart.escape_m:
             self._arc_m = float(self._chart.project(point[None], self._arc_m)[0, 0])
             normal = self._chart.frames(np.array([self._arc_m]), 1.0)[1][0]
-            escapes = not meets(point, normal, closing) and self._escapes(self._chart, route.path_in_odom)
+            escapes = not any(meets(point, normal, who) for who in closing) and self._escapes(self._chart, route.path_in_odom)
             self._escapes_ns = (self._escapes_ns or stamp_ns) if escapes else 0
             left = escapes and stamp_ns - self._escapes_ns >= round(self._settings.chart.escape_s * SECOND_NS)
             if moved_m < 0.05 and not left:

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.interface.samples import frozen_array
-from estimators.belief import F32, F64, Belief, ClearanceField, Lattice
+from estimators.belief import F32, F64, Belief, ClearanceField, Lattice, Mask
 from estimators.memory.rolling import transfer
-from planners.clearance_manifold.closing import ClosingMemory
+from planners.clearance_manifold.closing import SLOTS, ClosingMemory
 from planners.clearance_manifold.distance_kernels import lowered
 from planners.clearance_manifold.prediction_kernels import Arrival, nearest_closing, observe, taken_on_arrival
 from planners.clearance_manifold.recent_rate import RecentRate
@@ -20,7 +20,6 @@ from planners.clearance_manifold.settings import PredictionSettings
 
 NEVER_S = 1e6  # age of what was never in view
 CLOSING_M_S = 0.25
-LEAST_CELLS = 6
 SECOND_NS = 1_000_000_000
 
 
@@ -29,8 +28,8 @@ class Predicted:
     """The field on arrival."""
 
     clearance_m: F32  # (rows, columns), Gamma_pred
-    closing: F64  # (5,), of what closes in: middle in odom [m], velocity [m/s], number of cells, 0 where nothing does,
-    begins: bool  # and whether it is another than before
+    closing: F64  # (SLOTS, 5), of all that closes in: middle in odom [m], velocity [m/s], number of cells, 0 where nothing does,
+    begins: Mask  # (SLOTS,), and whether it is another than before
 
 
 class ArrivalField:
@@ -53,7 +52,7 @@ class ArrivalField:
         observe(age_s, known, np.zeros(2), 1.0, np.zeros(3), 1.0, (0.0, 0.0, 1.0), 0.0)
         taken = taken_on_arrival(field, field, age_s, np.zeros(2), 1.0, np.zeros(2), self._arrival(0.0))
         lowered(field, taken, 1.0)
-        nearest_closing(field, field, age_s, np.zeros(2), 1.0, np.zeros(2), CLOSING_M_S)
+        nearest_closing(field, field, age_s, np.zeros(2), 1.0, np.zeros(2), CLOSING_M_S, SLOTS)
 
     def update(self, belief: Belief) -> Predicted:
         """Take in what is seen now and return the prediction on the belief's lattice."""
@@ -64,10 +63,8 @@ class ArrivalField:
         cell_m = field.lattice.cell_m
         taken = taken_on_arrival(field.clearance_m, field.rate_m_s, self._age_s, corner, cell_m, robot, arrival)
         recent = self._recent.update(field, belief.stamp_ns)
-        closing = nearest_closing(field.clearance_m, field.rate_m_s, recent, corner, cell_m, robot, CLOSING_M_S)
-        if closing[4] < LEAST_CELLS:
-            closing[4] = 0.0
-        closing = self._closing.update(closing, field, self._met_s, elapsed_s)
+        found = nearest_closing(field.clearance_m, field.rate_m_s, recent, corner, cell_m, robot, CLOSING_M_S, SLOTS)
+        closing = self._closing.update(found, field, self._met_s, elapsed_s)
         return Predicted(lowered(field.clearance_m, taken, cell_m), closing, self._closing.begins)
 
     @property

@@ -6,10 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from estimators.belief import F32, F64, U8, Mask
 
 MOVER_M = 0.8  # cells this near to each other belong to one boundary
+LEAST_CELLS = 6  # of one
 
 
 class Arrival(NamedTuple):
@@ -64,8 +66,10 @@ def taken_on_arrival(clearance: F32, rate: F32, age_s: F32, corner: F64, cell_m:
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def nearest_closing(clearance: F32, rate: F32, recent: F32, corner: F64, cell_m: float, robot: F64, closing_m_s: float) -> F64:
-    """Return the boundary that closes in nearest to the robot: its middle in odom, its velocity, its number of cells, shape (5,).
+def nearest_closing(
+    clearance: F32, rate: F32, recent: F32, corner: F64, cell_m: float, robot: F64, closing_m_s: float, most: int
+) -> F64:
+    """Return the boundaries that close in, nearest to the robot first: middle in odom, velocity, number of cells, shape (n, 5).
 
     Around a boundary that moves with velocity v the field changes by -grad . v; v is the least-squares fit of that over the
     cells beside it, so that it needs no obstacle, only slopes and rates.
@@ -78,10 +82,10 @@ def nearest_closing(clearance: F32, rate: F32, recent: F32, corner: F64, cell_m:
         cell_m: size of a cell.
         robot: in odom, shape (2,).
         closing_m_s: slower boundaries are not looked at.
+        most: n at most.
     """
     rows, columns = clearance.shape
-    found, at = 0, np.empty((rows * columns, 2), np.int64)
-    nearest, near_x, near_y = np.inf, 0.0, 0.0
+    found, at, free = 0, np.empty((rows * columns, 2), np.int64), np.ones(rows * columns, np.bool_)
     for row in range(1, rows - 1):
         for column in range(1, columns - 1):
             change = rate[row, column]
@@ -89,16 +93,45 @@ def nearest_closing(clearance: F32, rate: F32, recent: F32, corner: F64, cell_m:
                 continue
             at[found, 0], at[found, 1] = row, column
             found += 1
-            x, y = corner[0] + (column + 0.5) * cell_m, corner[1] + (row + 0.5) * cell_m
+    out, count = np.zeros((most, 5)), 0
+    while count < most:
+        near_x, near_y, nearest = 0.0, 0.0, np.inf
+        for i in range(found):
+            x, y = corner[0] + (at[i, 1] + 0.5) * cell_m, corner[1] + (at[i, 0] + 0.5) * cell_m
             distance = np.hypot(x - robot[0], y - robot[1])
-            if change < 0.0 and distance < nearest:
+            if free[i] and rate[at[i, 0], at[i, 1]] < 0.0 and distance < nearest:
                 nearest, near_x, near_y = distance, x, y
+        if nearest == np.inf:
+            break
+        out[count] = _boundary(clearance, rate, recent, corner, cell_m, at[:found], free[:found], near_x, near_y)
+        for i in range(found):
+            x, y = corner[0] + (at[i, 1] + 0.5) * cell_m, corner[1] + (at[i, 0] + 0.5) * cell_m
+            beside = min(np.hypot(x - near_x, y - near_y), np.hypot(x - out[count, 0], y - out[count, 1]))
+            free[i] = free[i] and beside > MOVER_M
+        if out[count, 4] >= LEAST_CELLS:
+            count += 1
+    return out[:count]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _boundary(
+    clearance: F32,
+    rate: F32,
+    recent: F32,
+    corner: F64,
+    cell_m: float,
+    at: NDArray[np.int64],
+    free: Mask,
+    near_x: float,
+    near_y: float,
+) -> F64:
+    """Return the boundary around a place, fitted to those of the cells `at`, shape (n, 2), that are free, shape (n,)."""
     out = np.zeros(5)
     a, b, d, e, f = 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(found):
+    for i in range(len(at)):
         row, column = at[i]
         x, y = corner[0] + (column + 0.5) * cell_m, corner[1] + (row + 0.5) * cell_m
-        if (x - near_x) ** 2 + (y - near_y) ** 2 > MOVER_M * MOVER_M:
+        if not free[i] or (x - near_x) ** 2 + (y - near_y) ** 2 > MOVER_M * MOVER_M:
             continue
         slope_x = (clearance[row, column + 1] - clearance[row, column - 1]) / (2.0 * cell_m)
         slope_y = (clearance[row + 1, column] - clearance[row - 1, column]) / (2.0 * cell_m)

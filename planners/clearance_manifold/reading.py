@@ -11,6 +11,7 @@ from estimators.belief import F32, F64, Belief
 from estimators.field_query import sample
 from planners.clearance_manifold.control_kernels import known_length
 from planners.clearance_manifold.controller import UNKNOWN_GAP_M, Situation
+from planners.clearance_manifold.extraction import Scene
 from planners.clearance_manifold.lookout import Outlook
 from planners.clearance_manifold.manifold import Manifold, Stations
 from planners.clearance_manifold.settings import ClearanceManifoldSettings
@@ -36,7 +37,7 @@ class Reader:
         point: F64,
         left_m: float,
         closing: F64,
-        hand: float,
+        hands: F64,
         outlook: Outlook,
         met_s: F32,
     ) -> Situation:
@@ -47,8 +48,8 @@ class Reader:
             belief: the field that it lies in.
             point: that follows it, in odom, shape (2,).
             left_m: to the end of the chart, the goal.
-            closing: what closes in, shape (5,).
-            hand: on which it passes.
+            closing: what closes in, shape (n, 5).
+            hands: on which it passes, shape (n,).
             outlook: what unseen walkers leave of the way.
             met_s: how long ago each cell was looked at, shape (rows, columns).
         """
@@ -76,9 +77,31 @@ class Reader:
             robot=point,
             velocity=SE2(0.0, 0.0, belief.odom_from_base.yaw).apply(np.array([belief.twist.vx, belief.twist.vy])),
             closing=closing,
-            hand=hand,
+            hands=hands,
             behind_m=0.0 if self._strafes else self._behind(belief),
             stale=stale,
+        )
+
+    def standing(self, scene: Scene, belief: Belief, hands: F64) -> Situation:
+        """Return what the controller needs to stand where it does, but for who comes, on these hands, shape (n,)."""
+        own, yaw = self._stations.own, belief.odom_from_base.yaw
+        x, y = scene.sections.normal[own].tolist()
+        return Situation(
+            error=np.zeros(2),
+            tangent=np.array([y, -x]),
+            ridge_clearance_m=0.0,
+            margin_m=0.0,
+            commitment=0.0,
+            free_m=0.0,
+            clear_m=0.0,
+            most_m_s=0.0,
+            heading_rad=yaw,
+            feasible=False,
+            robot=scene.robot,
+            velocity=SE2(0.0, 0.0, yaw).apply(np.array([belief.twist.vx, belief.twist.vy])),
+            closing=scene.closing,
+            hands=hands,
+            behind_m=0.0 if self._strafes else self._behind(belief),
         )
 
     def _stale(self, manifold: Manifold, belief: Belief, met_s: F32) -> bool:
@@ -110,8 +133,11 @@ class Reader:
 
         Who closes in is not followed so far that the way ahead leaves the view.
         """
-        comes = closing[4] > 0.0 and float((closing[:2] - point) @ closing[2:4]) < 0.0  # who has passed is not looked after
-        s, watched = self._settings, closing[:2] if comes else look_at
+        off = closing[:, :2] - point
+        come = closing[(closing[:, 4] > 0.0) & ((off * closing[:, 2:4]).sum(axis=1) < 0.0)]  # who has passed is not looked after
+        comes = len(come) > 0
+        nearest = come[np.argmin(np.hypot(*(come[:, :2] - point).T)), :2] if comes else look_at
+        s, watched = self._settings, nearest
         if watched is None:
             return along_rad
         turns_for_it = look_at is watched and not self._strafes  # it stands meanwhile: no degree more than it takes

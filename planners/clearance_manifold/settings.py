@@ -3,6 +3,8 @@
 Constants per step are converted from the paper's control period of 0.2 s; the README says which settings the paper gives.
 """
 
+from typing import Literal
+
 from pydantic import Field
 
 from drivers.interface.settings import Settings
@@ -176,6 +178,9 @@ class WaitingSettings(Settings):
 
     patience_s: float = Field(default=6.0, ge=0.0, le=600.0, description="how long it looks at what blocks the way, then around")
     turn_rad_s: float = Field(default=0.6, gt=0.0, le=6.0, description="how fast it turns meanwhile")
+    blocked: Literal["stand", "make_way"] = Field(
+        default="stand", description="what it does meanwhile: it stands, or stays there but makes way for who comes"
+    )
 
 
 class ClearanceManifoldSettings(Settings):

@@ -7,7 +7,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.interface.commands import BodyTwist
 from drivers.interface.geometry import SE2, wrap_angle
 from estimators.belief import F64, Belief
 from estimators.field_query import sample
@@ -30,8 +29,8 @@ class Waiting:
         """Have a way again."""
         self._since_ns = 0
 
-    def twist(self, chart: Chart, arc_m: float, reach_m: float, least_m: float, belief: Belief) -> BodyTwist:
-        """Return how to turn on the spot.
+    def turn(self, chart: Chart, arc_m: float, reach_m: float, least_m: float, belief: Belief, come: F64) -> float:
+        """Return wz: towards who comes, or what blocks the way, or all around.
 
         Args:
             chart: the last one that led somewhere.
@@ -39,17 +38,21 @@ class Waiting:
             reach_m: how far ahead what blocks it is looked for.
             least_m: clearance that the robot needs.
             belief: the field.
+            come: who comes, shape (n, 5).
         """
         self._since_ns = self._since_ns or belief.stamp_ns
         s, waited_s = self._settings, (belief.stamp_ns - self._since_ns) / SECOND_NS
+        pose = belief.odom_from_base
+        if len(come):
+            return self._turn_to(come[np.argmin(np.hypot(come[:, 0] - pose.x, come[:, 1] - pose.y)), :2], pose)
         if waited_s > s.patience_s:
-            return BodyTwist(0.0, 0.0, min(s.turn_rad_s, self._most_rad_s))
-        return self._turn_to(blocked_at(chart, arc_m, reach_m, least_m, belief), belief.odom_from_base)
+            return min(s.turn_rad_s, self._most_rad_s)
+        return self._turn_to(blocked_at(chart, arc_m, reach_m, least_m, belief), pose)
 
-    def _turn_to(self, point: F64, pose: SE2) -> BodyTwist:
+    def _turn_to(self, point: F64, pose: SE2) -> float:
         off_rad = wrap_angle(math.atan2(point[1] - pose.y, point[0] - pose.x) - pose.yaw)
         most = min(self._settings.turn_rad_s, self._most_rad_s)
-        return BodyTwist(0.0, 0.0, min(max(off_rad, -most), most)) if abs(off_rad) > STILL_RAD else BodyTwist()
+        return min(max(off_rad, -most), most) if abs(off_rad) > STILL_RAD else 0.0
 
     def state(self) -> dict[str, NDArray[np.int64]]:
         """Return what is carried on, as named arrays."""

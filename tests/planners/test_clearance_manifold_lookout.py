@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from planners.clearance_manifold.closing import ClosingMemory
 from planners.clearance_manifold.lookout import Lookout
 from planners.clearance_manifold.lookout_kernels import Seen, Unseen, arrival, arrivals, openings
 from planners.clearance_manifold.planner import ClearanceManifold
@@ -110,32 +109,3 @@ def test_without_the_look_out_the_same_walker_is_met():
     settings = ClearanceManifoldSettings(prediction={"fov_deg": 87.0}, lookout={"enabled": False})
     planner = ClearanceManifold(settings, PlannerSetup(PERIOD_S, RADIUS_M, OMNI, 0))
     assert min(meet(planner, Corner(), 1.25, meet_s, duration_s=8.0)[0] for meet_s in (5.0, 5.5)) < 0.02
-
-
-def test_what_left_the_view_goes_on_for_a_moment_and_is_dropped_where_it_is_seen_not_to_be():
-    field = belief_of([]).clearance
-    age = np.ones(field.known.shape, np.float32)
-    walker, nobody = np.array([1.0, 0.5, -0.8, 0.2, 9.0]), np.zeros(5)
-    memory = ClosingMemory(1.0)
-    for step in range(-50, 1):
-        memory.update(walker + np.array([0.08 * -step, -0.02 * -step, 0.0, 0.0, 0.0]), field, age, 0.1)
-    for step in range(1, 10):
-        kept = memory.update(nobody, field, age, 0.1)
-        assert kept[:2] == pytest.approx([1.0 - 0.08 * step, 0.5 + 0.02 * step], abs=1e-3)
-    assert not memory.update(nobody, field, age, 0.2).any()
-    for _ in range(5):
-        memory.update(walker, field, age, 0.1)
-    assert not memory.update(nobody, field, 0.0 * age, 0.1).any()
-
-
-def test_what_seemed_to_close_in_for_a_moment_only_is_not_carried_on():
-    field = belief_of([]).clearance
-    age = np.ones(field.known.shape, np.float32)
-    memory = ClosingMemory(1.0)
-    assert memory.update(np.array([1.0, 0.5, -0.8, 0.2, 9.0]), field, age, 0.05).any()
-    assert not memory.update(np.zeros(5), field, age, 0.05).any()
-    for _ in range(20):
-        memory.update(
-            np.array([1.0, 0.5, -0.3, 0.2, 9.0]), field, age, 0.05
-        )  # it has a rate, but stays: a wall seen while turning
-    assert not memory.update(np.zeros(5), field, age, 0.05).any()

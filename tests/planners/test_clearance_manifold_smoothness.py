@@ -112,7 +112,7 @@ def test_the_end_of_a_wall_stops_closing_in_and_a_walker_does_not(speed):
         noise = rng.normal(0.0, 0.04, 2)
         ends = np.array([2.0 + noise[0], 1.4 + noise[1], 0.0, -speed * np.exp(-0.05 * tick / 0.56), 20.0])
         comes = np.array([2.0 + noise[0], 1.4 - 0.05 * speed * tick + noise[1], 0.0, -1.5 * speed, 20.0])  # a rate too high
-        still, moves = wall.update(ends, field, age, 0.05), walker.update(comes, field, age, 0.05)
+        still, moves = (memory.update(seen[None], field, age, 0.05)[0] for memory, seen in ((wall, ends), (walker, comes)))
     assert np.hypot(*still[2:4]) < 0.45 * speed * np.exp(-0.05 * 11 / 0.56)
     assert moves[3] == pytest.approx(-speed, rel=0.35)
 

@@ -12,7 +12,7 @@ from planners.clearance_manifold.settings import ClearanceManifoldSettings
 from planners.planner import PlannerSetup, no_path
 from planners.router import Route, RouterSetup
 from planners.routers.straight import StraightRouter
-from tests.planners.synthetic import OMNI, Box, belief_of, mission_to
+from tests.planners.synthetic import OMNI, Box, Disc, belief_of, mission_to
 
 PERIOD_S, RADIUS_M = 0.05, 0.12
 WALLS = (Box(-4, 1.0, 12, 1.2), Box(-4, -1.2, 12, -1.0))
@@ -24,7 +24,7 @@ BLOCKED = Route(GOAL, no_path(), 0.0, blocked=True)
 class Robot:
     """Turns as it is told."""
 
-    def __init__(self, **settings: float) -> None:
+    def __init__(self, **settings: float | str) -> None:
         chosen = ClearanceManifoldSettings(waiting=settings)
         self.planner = ClearanceManifold(chosen, PlannerSetup(PERIOD_S, RADIUS_M, OMNI, 0))
         self.pose, self.tick = SE2(), 0
@@ -85,3 +85,27 @@ def test_a_restored_planner_waits_on() -> None:
     other.planner.restore(one.planner.snapshot())
     other.pose, other.tick, other.twist = one.pose, one.tick, one.twist
     assert other.step(SHUT, BLOCKED).base == one.step(SHUT, BLOCKED).base != BodyTwist()
+
+
+@pytest.mark.parametrize("line_m", [0.0, 0.25, -0.1])
+def test_who_comes_along_while_it_waits_is_given_way_to_and_looked_at(line_m: float) -> None:
+    """He comes from behind at 0.7 m/s; standing still, the robot would be met."""
+    robot, least_m = Robot(blocked="make_way", patience_s=1.0, turn_rad_s=1.2), math.inf
+    robot.step(WALLS)
+    for tick in range(120):
+        walker = Disc(-2.5 + 0.7 * PERIOD_S * tick, line_m, 0.25, 0.7, 0.0)
+        plan = robot.step((*SHUT, walker), BLOCKED)
+        least_m = min(least_m, float(walker.distance(robot.pose.x, robot.pose.y)) - RADIUS_M)
+        if tick == 50:
+            assert abs(math.atan2(walker.y - robot.pose.y, walker.x - robot.pose.x) - robot.pose.yaw) % (2.0 * math.pi) < 0.5
+    assert least_m > 0.05
+    assert plan.diagnostics.refused
+
+
+def test_it_makes_way_for_nobody_where_it_is_to_stand_or_has_no_goal() -> None:
+    walker = Disc(-1.0, 0.1, 0.25, 0.7, 0.0)
+    for robot, route in ((Robot(), BLOCKED), (Robot(blocked="make_way"), Route(None, no_path(), 0.0, blocked=True))):
+        robot.step(WALLS)
+        for tick in range(20):
+            base = robot.step((*SHUT, walker.at(tick * PERIOD_S)), route).base
+            assert (base.vx, base.vy) == (0.0, 0.0)
