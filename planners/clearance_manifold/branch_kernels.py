@@ -8,7 +8,7 @@ from numba import njit
 from estimators.belief import F64
 from planners.clearance_manifold.ridge_kernels import Demand, Sections, worth
 
-BODY_M = 0.25  # from the middle of a boundary that closes in to its sides
+BODY_M = 0.33  # from the middle of who closes in to his sides, and by how much where he is may be wrong
 NARROW = 5.0  # cost of a station where the shield would stop; less, the nearer it is to ample
 EARLY = 0.7  # of the time to a place: the robot may be there so early
 STEEP = 2.0  # no branch is steeper: from one station to the next it would lead through what stands between them

@@ -20,12 +20,11 @@ from planners.clearance_manifold.passing_kernels import ABREAST_M, give_way, lef
 from planners.clearance_manifold.ridge_kernels import Sections
 
 SIDE_S = 6.0  # so long before he passes a hand is chosen: from where who walks slowly comes into view
-FAR_M = 0.7  # so far from the line of who comes he is nobody's
 GAIN_M, ONLY_M = 0.4, 0.2  # the other hand must be better by this, and if only that one can still be got to
 BRANCH = 0.25  # of what a branch costs a station: where there is no room it is 5 m and more, and noise is 0.5 m
 ACROSS_S = 0.6  # so long what leads across the way of who comes along it counts: it is noise, or he turns back before the wall
 BOUND_FOR_S = 0.5  # so long a velocity across the way leads on before the robot could turn back
-STRAIGHT_ON_M = 0.2  # with a miss smaller than this somebody comes straight on
+STRAIGHT_ON_M = 0.28  # with a miss smaller than this somebody comes straight on
 
 
 class Passing:
@@ -49,7 +48,8 @@ class Passing:
             Sections(np.zeros((1, 2)), np.array([[0.0, 1.0]]), np.zeros((1, 2))),
             np.array([1.0, 0.0, -1.0, 0.0, 1.0]),
         )
-        meets(np.zeros(2), sections.normal[0], closing)
+        meeting(np.zeros(2), closing)
+        runs_along(sections.normal[0], closing)
         left_to(1.0, sections, 0, np.zeros(2), 1.0, closing, 0.1)
         give_way(np.zeros(2), np.zeros(2), closing, 0.1, 1.0, 1.0)
         encounters(sections, np.zeros(1), np.zeros(2), 1.0, 1.0, closing)
@@ -133,9 +133,3 @@ def _turned_along(closing: F64, normal: F64, time_s: float) -> F64:
     turned = closing.copy()
     turned[2:4] -= max(0.0, 1.0 - ACROSS_S / max(time_s, ACROSS_S)) * float(normal @ closing[2:4]) * normal
     return turned
-
-
-def meets(point: F64, normal: F64, closing: F64) -> bool:
-    """Return whether what closes in, shape (5,), comes along a way with this normal, near to a point on it, shape (2,) each."""
-    time_s, miss_m = meeting(point, closing)
-    return bool(runs_along(normal, closing)) and abs(miss_m) < FAR_M and 0.0 < time_s < SIDE_S

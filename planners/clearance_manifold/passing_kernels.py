@@ -10,7 +10,7 @@ from planners.clearance_manifold.branch_kernels import BODY_M, EARLY
 from planners.clearance_manifold.ridge_kernels import Sections
 
 ALONG = 0.3  # the share of a velocity that leads across the way of who comes along it, at most
-ABREAST_M = 0.45  # so far past the middle of his boundary, which lies before his own, somebody still is beside the robot
+ABREAST_M = 0.30  # so far past his middle somebody still is beside the robot
 SOONEST_S = 0.5  # nobody is evaded faster than the base can
 
 

@@ -28,7 +28,7 @@ from planners.clearance_manifold.governor import Around, Governor
 from planners.clearance_manifold.lookout import Lookout, Outlook
 from planners.clearance_manifold.lookout_kernels import Seen
 from planners.clearance_manifold.manifold import Stations
-from planners.clearance_manifold.passing import Passing, meets
+from planners.clearance_manifold.passing import Passing
 from planners.clearance_manifold.prediction import ArrivalField, Predicted
 from planners.clearance_manifold.properties import check
 from planners.clearance_manifold.reading import Reader
@@ -156,15 +156,14 @@ class ClearanceManifold:
     def _follow_route(self, route: Route, point: F64, closing: F64, stamp_ns: int) -> bool:
         """Keep the chart, or lay a new one where the route left it; return whether the goal is another.
 
-        The route leads around who comes along the way, shape (n, 5), as if he stood, now on one side of him and now on the other.
+        The route leads around what closes in, shape (n, 5), as if it stood: a chart laid along it now would keep that detour.
         """
         assert route.goal_in_odom is not None
         goal = np.array(route.goal_in_odom)
         moved_m = math.inf if self._chart is None else float(np.hypot(*(goal - self._chart.goal)))
         if self._chart is not None and moved_m < self._settings.chart.escape_m:
             self._arc_m = float(self._chart.project(point[None], self._arc_m)[0, 0])
-            normal = self._chart.frames(np.array([self._arc_m]), 1.0)[1][0]
-            escapes = not any(meets(point, normal, who) for who in closing) and self._escapes(self._chart, route.path_in_odom)
+            escapes = not closing[:, 4].any() and self._escapes(self._chart, route.path_in_odom)
             self._escapes_ns = (self._escapes_ns or stamp_ns) if escapes else 0
             left = escapes and stamp_ns - self._escapes_ns >= round(self._settings.chart.escape_s * SECOND_NS)
             if moved_m < 0.05 and not left:

@@ -52,7 +52,7 @@ class ArrivalField:
         observe(age_s, known, np.zeros(2), 1.0, np.zeros(3), 1.0, (0.0, 0.0, 1.0), 0.0)
         taken = taken_on_arrival(field, field, age_s, np.zeros(2), 1.0, np.zeros(2), self._arrival(0.0))
         lowered(field, taken, 1.0)
-        nearest_closing(field, field, age_s, np.zeros(2), 1.0, np.zeros(2), CLOSING_M_S, SLOTS)
+        nearest_closing(field, field, age_s, 0.0, np.zeros(2), 1.0, np.zeros(2), CLOSING_M_S, SLOTS)
 
     def update(self, belief: Belief) -> Predicted:
         """Take in what is seen now and return the prediction on the belief's lattice."""
@@ -63,7 +63,8 @@ class ArrivalField:
         cell_m = field.lattice.cell_m
         taken = taken_on_arrival(field.clearance_m, field.rate_m_s, self._age_s, corner, cell_m, robot, arrival)
         recent = self._recent.update(field, belief.stamp_ns)
-        found = nearest_closing(field.clearance_m, field.rate_m_s, recent, corner, cell_m, robot, CLOSING_M_S, SLOTS)
+        window_s = self._recent.window_s(belief.stamp_ns)
+        found = nearest_closing(field.clearance_m, field.rate_m_s, recent, window_s, corner, cell_m, robot, CLOSING_M_S, SLOTS)
         closing = self._closing.update(found, field, self._met_s, elapsed_s)
         return Predicted(lowered(field.clearance_m, taken, cell_m), closing, self._closing.begins)
 

@@ -12,6 +12,9 @@ from estimators.belief import F32, F64, U8, Mask
 
 MOVER_M = 0.8  # cells this near to each other belong to one boundary
 LEAST_CELLS = 6  # of one
+THICK_M = 0.25  # from the surface of who comes to his middle
+LEAST_SLOPE = 0.5  # beside a boundary the clearance rises by a metre in a metre; where cells make it less, it leads nowhere
+TURNED = 0.7  # and where the mean of two slopes is less, the one before was another boundary's
 
 
 class Arrival(NamedTuple):
@@ -67,17 +70,20 @@ def taken_on_arrival(clearance: F32, rate: F32, age_s: F32, corner: F64, cell_m:
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def nearest_closing(
-    clearance: F32, rate: F32, recent: F32, corner: F64, cell_m: float, robot: F64, closing_m_s: float, most: int
+    clearance: F32, rate: F32, recent: F32, window_s: float, corner: F64, cell_m: float, robot: F64, closing_m_s: float, most: int
 ) -> F64:
-    """Return the boundaries that close in, nearest to the robot first: middle in odom, velocity, number of cells, shape (n, 5).
+    """Return what closes in, nearest to the robot first: middle in odom, velocity, number of cells, shape (n, 5).
 
     Around a boundary that moves with velocity v the field changes by -grad . v; v is the least-squares fit of that over the
-    cells beside it, so that it needs no obstacle, only slopes and rates.
+    cells beside it, so that it needs no obstacle, only slopes and rates.  A rate over some time goes with the slope in the
+    middle of it: beside who comes the slope turns, and with the last one he seems to come to that side.  Its middle lies
+    `THICK_M` behind its surface: of the surface only the part counts that is seen and has nothing else near, often one side.
 
     Args:
         clearance: shape (rows, columns) [m].
         rate: shape (rows, columns) [m/s], smoothed: it says which cells lie beside what closes in.
         recent: likewise, as it was of late (`RecentRate`), for the velocity; NaN where nothing is known of it.
+        window_s: the time that it was taken over.
         corner: lower corner of the lattice in odom, shape (2,).
         cell_m: size of a cell.
         robot: in odom, shape (2,).
@@ -103,7 +109,7 @@ def nearest_closing(
                 nearest, near_x, near_y = distance, x, y
         if nearest == np.inf:
             break
-        out[count] = _boundary(clearance, rate, recent, corner, cell_m, at[:found], free[:found], near_x, near_y)
+        out[count] = _boundary(clearance, rate, recent, window_s, corner, cell_m, at[:found], free[:found], near_x, near_y)
         for i in range(found):
             x, y = corner[0] + (at[i, 1] + 0.5) * cell_m, corner[1] + (at[i, 0] + 0.5) * cell_m
             beside = min(np.hypot(x - near_x, y - near_y), np.hypot(x - out[count, 0], y - out[count, 1]))
@@ -118,6 +124,7 @@ def _boundary(
     clearance: F32,
     rate: F32,
     recent: F32,
+    window_s: float,
     corner: F64,
     cell_m: float,
     at: NDArray[np.int64],
@@ -135,12 +142,18 @@ def _boundary(
             continue
         slope_x = (clearance[row, column + 1] - clearance[row, column - 1]) / (2.0 * cell_m)
         slope_y = (clearance[row + 1, column] - clearance[row - 1, column]) / (2.0 * cell_m)
-        a, b, d = a + slope_x * slope_x, b + slope_x * slope_y, d + slope_y * slope_y
-        change = recent[row, column] if np.isfinite(recent[row, column]) else rate[row, column]
-        e, f = e - slope_x * change, f - slope_y * change
-        out[0] += x - slope_x * clearance[row, column]
-        out[1] += y - slope_y * clearance[row, column]
+        inside = clearance[row, column] + THICK_M / max(np.hypot(slope_x, slope_y), LEAST_SLOPE)
+        out[0] += x - slope_x * inside
+        out[1] += y - slope_y * inside
         out[4] += 1.0
+        change = recent[row, column] if np.isfinite(recent[row, column]) else rate[row, column]
+        half_s = 0.25 * window_s / cell_m
+        mean_x = slope_x - half_s * (recent[row, column + 1] - recent[row, column - 1])
+        mean_y = slope_y - half_s * (recent[row + 1, column] - recent[row - 1, column])
+        if np.hypot(mean_x, mean_y) > TURNED:
+            slope_x, slope_y = mean_x, mean_y
+        a, b, d = a + slope_x * slope_x, b + slope_x * slope_y, d + slope_y * slope_y
+        e, f = e - slope_x * change, f - slope_y * change
     if out[4] > 0.0:
         out[0], out[1] = out[0] / out[4], out[1] / out[4]
         a, d = a + 0.05 * out[4], d + 0.05 * out[4]

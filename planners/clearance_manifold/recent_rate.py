@@ -43,6 +43,10 @@ class RecentRate:
         elapsed_s = (stamp_ns - at_ns) / SECOND_NS
         return np.asarray((now - kept) * np.float32(1.0 / elapsed_s if elapsed_s > 0.0 else np.nan))
 
+    def window_s(self, stamp_ns: int) -> float:
+        """Return over which time before that stamp the rate is taken [s]."""
+        return (stamp_ns - self._then[1]) / SECOND_NS
+
     def state(self) -> dict[str, NDArray[Any]]:
         """Return what is carried on, as named arrays."""
         at = self._lattice

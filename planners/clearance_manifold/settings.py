@@ -105,10 +105,10 @@ class ControllerSettings(Settings):
         default=1.0, gt=0.0, le=10.0, description="the heading is that of the manifold up to here"
     )
     yield_m: float = Field(
-        default=0.48,
+        default=0.56,
         ge=0.0,
         le=3.0,
-        description="between the robot's edge and the middle of what closes in; 0: it does not yield",
+        description="between the robot's edge and the middle of who closes in; 0: it does not yield",
     )
     yield_horizon_s: float = Field(default=2.5, gt=0.0, le=10.0, description="later encounters are not yielded to")
     view_margin_deg: float = Field(

@@ -127,17 +127,36 @@ def test_a_station_has_room_before_the_robot_is_there_and_is_the_slower_to_get_i
     assert not solver._towards(np.array([-0.1, np.nan] * 10 + [0.0]), scene).any()
 
 
-def test_a_route_that_leaves_the_chart_for_a_moment_does_not_bend_it():
-    planner, xs = planner_of(), np.arange(0.0, 9.0, 0.05)
-    straight = np.stack((xs, 0.0 * xs), axis=1)
-    aside = np.stack((xs, 0.95 * np.sin(np.clip(xs, 0.0, 3.0) * math.pi / 3.0)), axis=1)
+ALONG_X_M = np.arange(0.0, 9.0, 0.05)
+STRAIGHT_ON = np.stack((ALONG_X_M, 0.0 * ALONG_X_M), axis=1)
+ASIDE = np.stack((ALONG_X_M, 0.95 * np.sin(np.clip(ALONG_X_M, 0.0, 3.0) * math.pi / 3.0)), axis=1)
+
+
+def first_laid_anew(planner, aside):
+    """Return the first tick with another chart than before, where the route leads aside in the ticks of which `aside` says so."""
     charts = []
     for tick in range(60):
-        off = 10 <= tick < 20 or tick >= 30
-        planner.plan(at(tick), Route((9.0, 0.0), aside if off else straight, 9.0))
+        planner.plan(at(tick), Route((9.0, 0.0), ASIDE if aside(tick) else STRAIGHT_ON, 9.0))
         charts.append(planner._chart)
-    laid = [tick for tick in range(1, 60) if charts[tick] is not charts[tick - 1]]
-    assert laid[0] == 30 + round(planner.Settings().chart.escape_s / PERIOD_S)
+    return next(tick for tick in range(1, 60) if charts[tick] is not charts[tick - 1])
+
+
+def test_a_route_that_leaves_the_chart_for_a_moment_does_not_bend_it():
+    planner = planner_of()
+    laid = first_laid_anew(planner, lambda tick: 10 <= tick < 20 or tick >= 30)
+    assert laid == 30 + round(planner.Settings().chart.escape_s / PERIOD_S)
+
+
+def test_a_route_around_who_closes_in_does_not_bend_the_chart_before_he_is_gone(monkeypatch):
+    planner = planner_of()
+    update, crosses = planner._field.update, np.array([[3.0, -1.5, -0.5, 0.5, 20.0]] + 2 * [5 * [0.0]])
+
+    def seen(belief):
+        return replace(update(belief), closing=crosses if belief.stamp_ns < 40 * 50_000_000 else np.zeros((3, 5)))
+
+    monkeypatch.setattr(planner._field, "update", seen)
+    laid = first_laid_anew(planner, lambda tick: tick >= 10)
+    assert laid == 40 + round(planner.Settings().chart.escape_s / PERIOD_S)
 
 
 def test_without_continuation_every_tick_is_a_failure_to_continue():

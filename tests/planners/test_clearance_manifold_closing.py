@@ -7,6 +7,7 @@ from drivers.interface.geometry import SE2
 from estimators.belief import ClearanceField, Lattice
 from planners.clearance_manifold.branch_kernels import BODY_M, encounters
 from planners.clearance_manifold.control_kernels import known_way
+from planners.clearance_manifold.prediction_kernels import THICK_M, nearest_closing
 from planners.clearance_manifold.recent_rate import WINDOW_S, RecentRate
 from planners.clearance_manifold.ridge_kernels import Sections
 
@@ -48,6 +49,42 @@ def test_what_was_taken_in_goes_on_from_a_snapshot():
     other.take(rate.state())
     later = (field_of(0.7), 350_000_000)
     assert (rate.update(*later) == other.update(*later)).all()
+
+
+def clearance_beside_a_wall(x_m, y_m):
+    """Return the distance to what is seen of a disc there, its near half, and to a wall 0.3 m left of y = 0."""
+    y, x = (np.mgrid[0:60, 0:80] + 0.5) * CELL_M + np.array([-1.5, 0.0])[:, None, None]
+    turned = np.linspace(0.5 * np.pi, 1.5 * np.pi, 40)
+    disc = np.stack((x_m + THICK_M * np.cos(turned), y_m + THICK_M * np.sin(turned)), axis=1)
+    wall = np.stack((np.linspace(1.7, 2.3, 25), np.full(25, 0.3)), axis=1)
+    at = np.concatenate((disc, wall))
+    return np.hypot(x[..., None] - at[:, 0], y[..., None] - at[:, 1]).min(axis=2).astype(np.float32)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_who_comes_along_beside_something_is_where_he_is_and_not_where_he_is_seen(side):
+    """Between him and the wall the clearance is the wall's, so what is seen of him is the other half of his near side."""
+    before, now = (clearance_beside_a_wall(x_m, 0.0)[:: int(side)] for x_m in (2.2, 2.0))
+    rate = (now - before) / np.float32(0.25)
+    rate[:, round(2.0 / CELL_M) :] = 0.0  # nothing is seen through him
+    found = nearest_closing(now, rate, rate, 0.25, np.array([0.0, -1.5]), CELL_M, np.array([0.5, 0.0]), 0.25, 1)[0]
+    assert found[0] == pytest.approx(2.0, abs=0.1)
+    assert found[1] == pytest.approx(0.0, abs=0.03)
+
+
+@pytest.mark.parametrize("step_m", [0.10, 0.15, 0.20])
+def test_the_rate_over_a_window_goes_with_the_slopes_in_the_middle_of_it(step_m):
+    """A post comes along x at 0.8 m/s, and closes in on one side only: with the last slopes it seems to come to that side."""
+    y, x = (np.mgrid[0:60, 0:80] + 0.5) * CELL_M + np.array([-1.5, 0.0])[:, None, None]
+    before, now = (np.hypot(x - x_m, y).astype(np.float32) for x_m in (2.0 + step_m, 2.0))
+    recent = (now - before) / np.float32(step_m / 0.8)
+    rate = np.where((x < 2.0) & (y < 0.0), recent, np.float32(0.0))
+    middle, last = (
+        nearest_closing(now, rate, recent, window_s, np.array([0.0, -1.5]), CELL_M, np.array([0.5, 0.0]), 0.25, 1)[0]
+        for window_s in (step_m / 0.8, 0.0)
+    )
+    assert middle[2:4] == pytest.approx([-0.8, 0.0], abs=0.18)
+    assert abs(middle[3]) < 0.5 * abs(last[3])
 
 
 def sections_at(xs):

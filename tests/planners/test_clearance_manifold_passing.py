@@ -9,7 +9,7 @@ from drivers.interface.geometry import SE2
 from planners.clearance_manifold.branch_kernels import BODY_M, EARLY
 from planners.clearance_manifold.closing import SLOTS
 from planners.clearance_manifold.extraction import Scene
-from planners.clearance_manifold.passing import Passing, meets
+from planners.clearance_manifold.passing import Passing
 from planners.clearance_manifold.passing_kernels import ABREAST_M, give_way, left_to, meeting, runs_along
 from planners.clearance_manifold.ridge_kernels import Ground, Sections
 
@@ -68,16 +68,6 @@ def test_when_and_on_which_hand_somebody_passes(yaw):
     normal = turned.apply(np.array([0.0, 1.0]))
     assert runs_along(normal, closing)
     assert not runs_along(turned.apply(np.array([1.0, 0.0])), closing)
-
-
-def test_no_new_way_is_laid_around_who_comes_along_it():
-    normal = np.array([0.0, 1.0])
-    assert meets(STANDS, normal, coming(2.0, 0.3, -0.6, 0.0))
-    assert not meets(STANDS, normal, coming(2.0, 0.8, -0.6, 0.0))  # he is nobody's
-    assert not meets(STANDS, normal, coming(2.0, 0.3, 0.6, 0.0))  # he goes away
-    assert not meets(STANDS, normal, coming(2.0, -2.0, -0.6, 0.6))  # he crosses
-    assert not meets(STANDS, normal, coming(2.0, 0.3, -0.3, 0.0))  # that is not soon
-    assert not meets(STANDS, normal, NOBODY)
 
 
 @pytest.mark.parametrize("hand", [1.0, -1.0])
