@@ -117,7 +117,7 @@ class ClearanceManifold:
         if not blocked:
             self._passing.reset()
             self._chart = None
-        if self._chart is not None:
+        if self._chart is not None and (self._limits.holonomic or twist.vx == 0.0):  # what cannot strafe steers out of the way
             wz = self._waiting.turn(self._chart, self._arc_m, s.solver.horizon_m, self._solver.least_m, belief, come)
             twist = replace(twist, wz=wz)
         return Plan(twist, diagnostics=ManifoldDiagnostics(fallback_category="", stopped=reason))

@@ -5,14 +5,14 @@ from dataclasses import replace
 
 import pytest
 
-from drivers.interface.commands import BodyTwist
+from drivers.interface.commands import BaseLimits, BodyTwist
 from drivers.interface.geometry import SE2
 from planners.clearance_manifold.planner import ClearanceManifold
 from planners.clearance_manifold.settings import ClearanceManifoldSettings
 from planners.planner import PlannerSetup, no_path
 from planners.router import Route, RouterSetup
 from planners.routers.straight import StraightRouter
-from tests.planners.synthetic import OMNI, Box, Disc, belief_of, mission_to
+from tests.planners.synthetic import DIFFERENTIAL, OMNI, Box, Disc, belief_of, mission_to
 
 PERIOD_S, RADIUS_M = 0.05, 0.12
 WALLS = (Box(-4, 1.0, 12, 1.2), Box(-4, -1.2, 12, -1.0))
@@ -24,9 +24,9 @@ BLOCKED = Route(GOAL, no_path(), 0.0, blocked=True)
 class Robot:
     """Turns as it is told."""
 
-    def __init__(self, **settings: float | str) -> None:
+    def __init__(self, limits: BaseLimits = OMNI, **settings: float | str) -> None:
         chosen = ClearanceManifoldSettings(waiting=settings)
-        self.planner = ClearanceManifold(chosen, PlannerSetup(PERIOD_S, RADIUS_M, OMNI, 0))
+        self.planner = ClearanceManifold(chosen, PlannerSetup(PERIOD_S, RADIUS_M, limits, 0))
         self.pose, self.tick = SE2(), 0
         self.twist = BodyTwist()
 
@@ -109,3 +109,14 @@ def test_it_makes_way_for_nobody_where_it_is_to_stand_or_has_no_goal() -> None:
         for tick in range(20):
             base = robot.step((*SHUT, walker.at(tick * PERIOD_S)), route).base
             assert (base.vx, base.vy) == (0.0, 0.0)
+
+
+def test_a_base_that_cannot_strafe_steers_while_it_makes_way() -> None:
+    """It looks to its left when he comes along the corridor from its right: it drives aside on a straight line, not a curve."""
+    robot = Robot(DIFFERENTIAL, blocked="make_way", patience_s=0.0, turn_rad_s=1.2)
+    robot.step(WALLS)
+    robot.pose = SE2(0.0, 0.0, 0.5 * math.pi)
+    for tick in range(50):
+        plan = robot.step((*SHUT, Disc(-2.0 + 0.7 * PERIOD_S * tick, -0.05, 0.25, 0.7, 0.0)), BLOCKED)
+        assert plan.base.vx == 0.0 or abs(plan.base.wz) < 0.3
+    assert robot.pose.y > 0.25
