@@ -124,35 +124,46 @@ def extremes(values: NDArray[np.float32]) -> tuple[np.float32, np.float32]:
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def gather_smallest(values: NDArray[np.float32], count: int) -> None:
-    """Reorder finite values, shape (n,), so that the `count` smallest, n at most, come first, in no particular order.
+def gather_smallest(values: NDArray[np.float32], count: int, found: NDArray[np.float32]) -> None:
+    """Write the `count` smallest of finite values, shape (n,), n at least count, into the front of `found`, shape (n + 1,).
 
-    The largest of them is found by bisection: counting is vectorised, where sorting guesses wrong at every other branch.
+    They come in the order in which they stand, those equal to the largest of them last.  It is found by bisection: counting is
+    vectorised, where sorting guesses wrong at every other branch.
     """
-    low, high = extremes(values)
-    while True:
-        middle = np.float32(0.5) * (low + high)
-        if not low < middle < high:
-            break
-        within = count_within(values, middle)
-        if within < count:
-            low = middle
-        else:
-            high = middle
-            if within == count:
-                break
-    moved = move_within(values, high)
-    if moved > count:  # several equal the largest
-        move_within(values[:moved], low)
+    low, high = edge_of_smallest(values, count)
+    if write_within(values, high, found) > count:  # several equal the largest
+        found[write_within(values, low, found) : count] = high
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def move_within(values: NDArray[np.float32], limit: np.float32) -> int:
-    """Reorder values, shape (n,), so that those at most the limit come first; return how many they are."""
+def edge_of_smallest(values: NDArray[np.float32], count: int) -> tuple[np.float32, np.float32]:
+    """Return a number below which or at which fewer than `count` of the values lie, and one where as many or more do.
+
+    Either as many do, or no number lies between the two.  A value may be the least of all, and then no number is below.
+    Zero, where bisection would go on through ever smaller numbers, is looked at first.
+    """
+    low, high = extremes(values)
+    zero = np.float32(0.0)
+    beneath = np.nextafter(zero, np.float32(-1.0))
+    if low <= zero < high:
+        low, high = (low, zero) if count_within(values, zero) >= count else (zero, high)
+    if low < beneath < high == zero:
+        low, high = (low, beneath) if count_within(values, beneath) >= count else (beneath, zero)
+    while True:
+        middle = np.float32(0.5) * (low + high)
+        if not low < middle < high:
+            return low, high
+        within = count_within(values, middle)
+        if within == count:
+            return low, middle
+        low, high = (middle, high) if within < count else (low, middle)
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def write_within(values: NDArray[np.float32], limit: np.float32, found: NDArray[np.float32]) -> int:
+    """Write values, shape (n,), that are at most the limit into the front of `found`, (n + 1,); return how many they are."""
     first = 0
     for i in range(len(values)):
-        value = values[i]
-        values[i] = values[first]
-        values[first] = value
-        first += value <= limit
+        found[first] = values[i]
+        first += values[i] <= limit
     return first

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,18 +13,9 @@ from planners.prediction.chance import Chance
 from planners.prediction.conjectures import ConjectureFamily
 from planners.prediction.predictor import Futures, Occasion, Predictor
 from planners.prediction.walls import Walls, keep_out
-from planners.rcsp.kernels import (
-    INVERSE_CLEARANCE,
-    NEAR_MISS,
-    VIOLATION,
-    Risk,
-    clearances,
-    largest,
-    lower_at_rest,
-    mean_risks,
-    reacting_clearances,
-    tails,
-)
+from planners.rcsp.clearance_kernels import clearances
+from planners.rcsp.reacting_kernels import reacting_clearances
+from planners.rcsp.risk_kernels import INVERSE_CLEARANCE, NEAR_MISS, VIOLATION, Risk, largest, mean_risks, tails
 from planners.rcsp.settings import RcspSettings, RiskSettings
 from planners.risk import objective_error, tail_count
 from planners.velocity_lattice import Rollouts, path_of
@@ -43,7 +34,7 @@ class Evaluation:
     risk: F64  # (commands,), the risk measure of G
     room_m: F64  # (commands,), mean clearance of the tail, up to where there is no risk
     free: NDArray[np.bool_]  # (commands,), whether fewer scenarios than make a tail touch anything
-    clearance: F32  # (commands, scenarios), tail first
+    clearance: F32  # (commands, scenarios)
     static_m: F32  # (commands,), to what stands still
     brakable: NDArray[np.bool_]  # (commands,)
     form: Risk
@@ -127,16 +118,19 @@ class Evaluator:
         occasion = Occasion(self._all_times_s, stays, scenarios)
         if s.reaction == "candidate" and isinstance(predictor, ConjectureFamily):
             futures, draws = predictor.sample_with_draws(occasion, chance)
-            keep_out(futures.position_in_odom, futures.radius_m, walls)
-            contact = (futures.radius_m + self._radius_m).astype(np.float32)
-            clearance = reacting_clearances(rolled.x, rolled.y, draws, self._steps_s, far_m)
+            position, contact = self._held(futures, walls)
+            at_rest = clearances(rolled.x[:, :0].copy(), rolled.y[:, :0].copy(), rolled.rest, position[s.steps :], contact, far_m)
+            clearance = np.minimum(reacting_clearances(rolled.x, rolled.y, draws, self._steps_s, far_m), at_rest)
         else:
             futures = predictor.sample(occasion, chance)
-            keep_out(futures.position_in_odom, futures.radius_m, walls)
-            contact = (futures.radius_m + self._radius_m).astype(np.float32)
-            clearance = clearances(rolled.x, rolled.y, futures.position_in_odom[: s.steps], contact, far_m)
-        lower_at_rest(rolled.rest, futures.position_in_odom[s.steps :], contact, far_m, clearance)
-        return replace(futures, position_in_odom=futures.position_in_odom[: s.steps]), clearance
+            position, contact = self._held(futures, walls)
+            clearance = clearances(rolled.x, rolled.y, rolled.rest, position, contact, far_m)
+        return Futures(position[: s.steps], futures.radius_m, futures.conjecture), clearance
+
+    def _held(self, futures: Futures, walls: Walls) -> tuple[F32, F32]:
+        """Hold futures by walls; return them, and at which distance of the centres each obstacle touches, shape (obstacles,)."""
+        keep_out(futures.position_in_odom, futures.radius_m, walls)
+        return futures.position_in_odom, (futures.radius_m + self._radius_m).astype(np.float32)
 
     def bound(self, scenarios: int) -> float:
         """Return epsilon_N(delta) of proposition C.3."""

@@ -25,9 +25,9 @@ from planners.prediction.predictor import Predictor
 from planners.prediction.random_walk import RandomWalkPredictor
 from planners.prediction.walls import Walls
 from planners.rcsp.budget import affordable
+from planners.rcsp.clearance_kernels import least_gap
 from planners.rcsp.drawing import commitment_step, drawn
 from planners.rcsp.evaluation import Evaluation, Evaluator, RcspDiagnostics
-from planners.rcsp.kernels import least_gap
 from planners.rcsp.progress_kernels import way_made
 from planners.rcsp.rehearsal import rehearse
 from planners.rcsp.settings import RcspSettings

@@ -15,20 +15,11 @@ from estimators.belief import Track
 from planners.planner import Anytime, PlannerSetup, no_path
 from planners.prediction.predictor import Futures
 from planners.rcsp.budget import affordable
+from planners.rcsp.clearance_kernels import clearances
 from planners.rcsp.evaluation import Evaluation
-from planners.rcsp.kernels import (
-    INVERSE_CLEARANCE,
-    NEAR_MISS,
-    VIOLATION,
-    Risk,
-    clearances,
-    largest,
-    lower_at_rest,
-    risk_of,
-    tails,
-)
 from planners.rcsp.planner import Rcsp
 from planners.rcsp.progress_kernels import to_go
+from planners.rcsp.risk_kernels import INVERSE_CLEARANCE, NEAR_MISS, VIOLATION, Risk, largest, risk_of, risks_of, tails
 from planners.router import Route, RouterSetup
 from planners.routers.straight import StraightRouter
 from planners.shield import ShieldSetup
@@ -300,6 +291,9 @@ def test_risk_falls_with_clearance_and_is_bounded(kind):
     assert values[0] == largest(risk, 0.4)
     assert values[-1] == 0.0
     assert risk_of(-0.01, 0.4, risk) > risk_of(0.01, 0.4, risk)
+    at_once, places = np.empty(401), np.linspace(-1.0, 1.0, 401, dtype=np.float32)
+    risks_of(places, 0.4, risk, at_once)
+    assert at_once.tolist() == [risk_of(c, 0.4, risk) for c in places]
 
 
 def test_clearances_are_those_of_a_brute_force():
@@ -307,22 +301,26 @@ def test_clearances_are_those_of_a_brute_force():
     x, y = (rng.uniform(-2.0, 2.0, (7, 9)).astype(np.float32) for _ in range(2))
     futures = rng.uniform(-2.0, 2.0, (9, 3, 2, 20)).astype(np.float32)
     contact = np.array([0.3, 0.5, 0.7], np.float32)
-    found = clearances(x, y, futures, contact, 1.0)
+    found = clearances(x[:, :7].copy(), y[:, :7].copy(), np.stack((x[:, 8], y[:, 8]), axis=1), futures, contact, 1.0)
+    x[:, 7:], y[:, 7:] = x[:, 8:], y[:, 8:]  # after seven steps it stands
     apart = np.hypot(futures[None, :, :, 0] - x[:, :, None, None], futures[None, :, :, 1] - y[:, :, None, None])
-    expected = np.minimum((apart - contact[:, None]).min(axis=(1, 2)), 1.0)
+    apart = apart - contact[:, None]
+    apart[:, 7:] = np.maximum(apart[:, 7:], 0.0)
+    expected = np.minimum(apart.min(axis=(1, 2)), 1.0)
     assert found == pytest.approx(expected, abs=1e-5)
+    assert (expected == 0.0).any()
 
 
 def test_standing_in_somebody_s_way_after_the_horizon_is_a_near_miss():
-    rest = np.array([[0.0, 0.0], [0.0, 2.0], [0.0, 0.0]], np.float32)
+    at = np.array([[0.0, 0.0], [0.0, 2.0], [0.0, 0.7]], np.float32)
     futures = np.array([[-1.0, -0.2, 0.6], [0.0, 0.0, 0.0]], np.float32).T.reshape(3, 1, 2, 1)  # (steps, 1, 2, 1): past the first
-    clearance = np.full((3, 1), np.float32(0.4))
-    clearance[2] = -0.1  # it touches somebody before
-    lower_at_rest(rest, futures, np.array([0.5], np.float32), 0.4, clearance)
-    assert clearance[:, 0] == pytest.approx([0.0, 0.4, -0.1])
-    apart = np.full((1, 1), np.float32(0.4))
-    lower_at_rest(np.array([[0.0, 0.7]], np.float32), futures, np.array([0.5], np.float32), 0.4, apart)
-    assert apart[0, 0] == pytest.approx(math.hypot(0.2, 0.7) - 0.5)
+    contact, elsewhere = np.array([0.5], np.float32), np.full((3, 3), 9.0, np.float32)
+    before, after = np.full((3, 1, 2, 1), -9.0, np.float32), np.concatenate((np.full((3, 1, 2, 1), -9.0, np.float32), futures))
+    expected = [0.0, 0.4, math.hypot(0.2, 0.7) - 0.5]
+    assert clearances(elsewhere, elsewhere, at, after, contact, 0.4)[:, 0] == pytest.approx(expected)
+    x, y = (np.repeat(at[:, axis : axis + 1], 3, axis=1) for axis in range(2))  # under way, not at rest
+    under_way = clearances(x, y, elsewhere[:, :2].copy(), np.concatenate((futures, before)), contact, 0.4)
+    assert under_way[:, 0] == pytest.approx([-0.3, *expected[1:]])
 
 
 def evaluation_of(*commands):
