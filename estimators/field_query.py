@@ -14,15 +14,15 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from estimators.belief import F64, Lattice
 
 Field = NDArray[Any]  # (rows, columns), any real dtype
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _corner(coordinate: float, last: int) -> tuple[int, float]:
     """Return the lower neighbour and the weight of the upper one, clamped to centres 0 to `last`."""
     clamped = coordinate if coordinate > 0.0 else 0.0
@@ -31,7 +31,7 @@ def _corner(coordinate: float, last: int) -> tuple[int, float]:
     return lower, clamped - lower
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def bilinear(field: Field, x_m: float, y_m: float, cell_m: float, x: float, y: float) -> float:
     """Return the field's value at (x, y) [m]; (x_m, y_m) is the lattice's lower corner."""
     last_row, last_column = field.shape[0] - 1, field.shape[1] - 1
@@ -44,7 +44,7 @@ def bilinear(field: Field, x_m: float, y_m: float, cell_m: float, x: float, y: f
     return value
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def bilinear_gradient(field: Field, x_m: float, y_m: float, cell_m: float, x: float, y: float) -> tuple[float, float, float]:
     """Return value, d/dx and d/dy [per metre] at (x, y); a component is zero where the point is clamped along it."""
     last_row, last_column = field.shape[0] - 1, field.shape[1] - 1
@@ -60,7 +60,7 @@ def bilinear_gradient(field: Field, x_m: float, y_m: float, cell_m: float, x: fl
     return value, dx, dy
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _sample(field: Field, x_m: float, y_m: float, cell_m: float, points: F64) -> F64:
     values = np.empty(len(points))
     for i in range(len(points)):
@@ -68,7 +68,7 @@ def _sample(field: Field, x_m: float, y_m: float, cell_m: float, points: F64) ->
     return values
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _gradient(field: Field, x_m: float, y_m: float, cell_m: float, points: F64) -> F64:
     slopes = np.empty((len(points), 2))
     for i in range(len(points)):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from drivers.interface.kernel import kernel
 
 F64 = NDArray[np.float64]
 
@@ -31,7 +32,7 @@ def resample(path: F64, spacing_m: float) -> F64:
     return np.stack((np.interp(wanted, along, path[:, 0]), np.interp(wanted, along, path[:, 1])), axis=1)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def beginning(path: F64, length_m: float, spacing_m: float) -> tuple[F64, F64]:
     """Return the first `length_m` of the path with points at least `spacing_m` apart, and the distance along it of each.
 
@@ -54,7 +55,7 @@ def beginning(path: F64, length_m: float, spacing_m: float) -> tuple[F64, F64]:
     return kept[:count], along[:count]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def point_along(path: F64, distance_m: float) -> tuple[float, float]:
     """Return the point of the path, shape (n, 2), that lies `distance_m` along it; its end when it is shorter."""
     left = distance_m

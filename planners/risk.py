@@ -12,8 +12,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from drivers.interface.kernel import kernel
 
 F64 = NDArray[np.float64]
 
@@ -98,7 +99,7 @@ def _check(count: int, fraction: float) -> None:
         raise ValueError(f"it takes at least one sample and a fraction in (0, 1], not {count} and {fraction:g}")
 
 
-@njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "arcp", "nsz"})  # type: ignore[untyped-decorator]
+@kernel(fast=True)
 def count_within(values: NDArray[np.float32], limit: np.float32) -> np.float32:
     """Return how many of the values, shape (n,), are at most the limit; counted in the type of the values, to be vectorised."""
     count, one, zero = np.float32(0.0), np.float32(1.0), np.float32(0.0)
@@ -107,7 +108,7 @@ def count_within(values: NDArray[np.float32], limit: np.float32) -> np.float32:
     return count
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def extremes(values: NDArray[np.float32]) -> tuple[np.float32, np.float32]:
     """Return the least and the largest of values, shape (n,), n > 0; in four lanes, as each comparison waits for the last."""
     n = len(values)
@@ -123,7 +124,7 @@ def extremes(values: NDArray[np.float32]) -> tuple[np.float32, np.float32]:
     return low, high
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def gather_smallest(values: NDArray[np.float32], count: int, found: NDArray[np.float32]) -> None:
     """Write the `count` smallest of finite values, shape (n,), n at least count, into the front of `found`, shape (n + 1,).
 
@@ -135,7 +136,7 @@ def gather_smallest(values: NDArray[np.float32], count: int, found: NDArray[np.f
         found[write_within(values, low, found) : count] = high
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def edge_of_smallest(values: NDArray[np.float32], count: int) -> tuple[np.float32, np.float32]:
     """Return a number below which or at which fewer than `count` of the values lie, and one where as many or more do.
 
@@ -159,7 +160,7 @@ def edge_of_smallest(values: NDArray[np.float32], count: int) -> tuple[np.float3
         low, high = (middle, high) if within < count else (low, middle)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def write_within(values: NDArray[np.float32], limit: np.float32, found: NDArray[np.float32]) -> int:
     """Write values, shape (n,), that are at most the limit into the front of `found`, (n + 1,); return how many they are."""
     first = 0

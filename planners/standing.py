@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from drivers.interface.kernel import kernel
 from drivers.interface.samples import frozen_array
 from estimators.belief import F32, F64, OCCUPIED, Belief, Lattice, Mask, Track
 from estimators.clearance import distance_to
@@ -69,7 +69,7 @@ def standing_world(belief: Belief) -> StandingWorld:
     return StandingWorld(lattice, frozen_array(occupied), frozen_array(clearance))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _enclosed(occupied: Mask, row: int, column: int) -> bool:
     """Return whether all four neighbours of a cell are occupied; one at the lattice's border is not enclosed."""
     rows, columns = occupied.shape
@@ -79,7 +79,7 @@ def _enclosed(occupied: Mask, row: int, column: int) -> bool:
     return bool(upright and occupied[row, column - 1] and occupied[row, column + 1])
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _near_cells(occupied: Mask, x_m: float, y_m: float, cell_m: float, path: F64, reach_m: float) -> tuple[F64, F64]:
     """Return the outermost occupied cells' centres, shape (m, 2), within reach of the path, and their distances, shape (m,)."""
     rows, columns = occupied.shape
@@ -102,7 +102,7 @@ def _near_cells(occupied: Mask, x_m: float, y_m: float, cell_m: float, path: F64
     return centres[:count].copy(), apart[:count].copy()
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _thin_out(centres: F64, apart: F64, spacing_m: float, most: int) -> F64:
     """Return the nearest centre, the nearest of those at least `spacing_m` from it, and so on, shape (n, 2)."""
     left, chosen, count = apart.copy(), np.empty((most, 2)), 0

@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from drivers.interface.samples import frozen_array
 from estimators.belief import F32, F64, OCCUPIED, Belief, Lattice, Mask, Track
 from estimators.field_query import sample
@@ -115,7 +115,7 @@ def _certain(track: Track) -> bool:
     return math.isfinite(x) and math.isfinite(y) and math.isfinite(track.radius_m) and variance <= CERTAIN_M**2
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _without(label: NDArray[np.uint8], discs: F64, x_m: float, y_m: float, cell_m: float) -> Mask:
     """Return which cells are occupied outside of the discs (x, y, radius), shape (n, 3)."""
     occupied: Mask = label == OCCUPIED
@@ -130,7 +130,7 @@ def _without(label: NDArray[np.uint8], discs: F64, x_m: float, y_m: float, cell_
     return occupied
 
 
-@njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "arcp", "nsz"})  # type: ignore[untyped-decorator]
+@kernel(fast=True)
 def near_distance(occupied: Mask, most: int, cell_m: float) -> F32:
     """Return the distance [m] from each cell's centre to that of the nearest occupied one, `most` cells at most.
 

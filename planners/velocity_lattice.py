@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from pydantic import Field
 
 from drivers.interface.commands import BaseLimits, BodyTwist
+from drivers.interface.kernel import kernel
 from drivers.interface.settings import Settings
 from estimators.belief import UNKNOWN
 from estimators.field_query import bilinear
@@ -142,14 +142,14 @@ def path_of(rolled: Rollouts, command: int) -> F64:
     return path
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _never_seen(label: NDArray[np.uint8], columns: float, rows: float) -> bool:
     """Return whether a point, in cells from the lower corner, lies in a cell that was never seen; outside none was."""
     inside = 0.0 <= rows < label.shape[0] and 0.0 <= columns < label.shape[1]
     return not inside or label[np.uint32(rows), np.uint32(columns)] == UNKNOWN
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def profiles(now: float, targets: F64, acceleration: float, response_s: float, step_s: float, steps: int) -> F64:
     """Return the velocities at the ends of the steps, first the present one, shape (targets, steps + 1)."""
     share = 1.0 - math.exp(-step_s / response_s) if response_s > 0.0 else 1.0
@@ -163,7 +163,7 @@ def profiles(now: float, targets: F64, acceleration: float, response_s: float, s
     return values
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def after_latency(pose: F64, now: F64, asked: F64, drive: Drive) -> tuple[F64, F64]:
     """Return pose (x, y, yaw) and velocity (v, omega) when the next command takes hold, the last one being followed till then.
 
@@ -181,7 +181,7 @@ def after_latency(pose: F64, now: F64, asked: F64, drive: Drive) -> tuple[F64, F
     return moved, np.array([v[1], w[1]])
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def least_room(points: F64, around: Ground) -> float:
     """Return the least clearance to what stands still at some points, shape (n, 2), surface to surface [m]."""
     least = np.inf
@@ -191,7 +191,7 @@ def least_room(points: F64, around: Ground) -> float:
     return least
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def roll_out(pose: F64, now: F64, speeds: F64, turns: F64, drive: Drive, step_s: float, steps: int, around: Ground) -> Rollouts:
     """Drive every pair of a speed and a turn from a pose, shape (3,), and a velocity, shape (2,).
 

@@ -6,9 +6,9 @@ Image rays are (x, y, 1) in the optical frame and not normalised: their paramete
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from sim_drivers.ray_kernels import PLANE, first_hit
 
 F32 = NDArray[np.float32]
@@ -19,7 +19,7 @@ NEAR_M = 1e-4  # a solid that crosses the image plane is cut here before it is p
 _EDGES = np.array([(i, i ^ bit) for i in range(8) for bit in (1, 2, 4)])  # (24, 2): corners of a box, along its edges both ways
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _span(low: float, high: float, count: int) -> tuple[int, int]:
     """Return the half-open range of pixels of an image axis within [low, high], a hair wider."""
     first = np.ceil(min(max(low - 1e-6, 0.0), float(count)))
@@ -27,7 +27,7 @@ def _span(low: float, high: float, count: int) -> tuple[int, int]:
     return int(first), int(last) + 1
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _transform(rotation: F64, position: F64, centre: F64, local: F64, to_centre: F64, to_local: F64) -> None:
     """Write a pose in the map, `centre` (3,) and `local` (3, 3), as seen from the camera at `position`, `rotation`."""
     for i in range(3):
@@ -38,7 +38,7 @@ def _transform(rotation: F64, position: F64, centre: F64, local: F64, to_centre:
             to_local[i, j] = rotation[0, i] * local[0, j] + rotation[1, i] * local[1, j] + rotation[2, i] * local[2, j]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _corners(centre: F64, rotation: F64, extents: F64, corners: F64) -> None:
     for i in range(8):
         for axis in range(3):
@@ -47,7 +47,7 @@ def _corners(centre: F64, rotation: F64, extents: F64, corners: F64) -> None:
                 corners[i, axis] += rotation[axis, k] * (extents[k] if i & (1 << k) else -extents[k])
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _rectangle(corners: F64, pinhole: F64, window: I64) -> float:
     """Project a box, corners (8, 3) in the optical frame, narrow the window (4,) to it and return its least depth."""
     fx, fy, cx, cy = pinhole
@@ -69,7 +69,7 @@ def _rectangle(corners: F64, pinhole: F64, window: I64) -> float:
     return nearest if nearest > NEAR_M else 0.0
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _draw(
     kind: int, size: F64, centre: F64, rotation: F64, pinhole: F64, window: I64, nearest: float, far: float, depth: F32
 ) -> None:
@@ -95,7 +95,7 @@ def _draw(
                 depth[v, u] = t
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def draw_depth(
     kinds: I64,
     sizes: F64,

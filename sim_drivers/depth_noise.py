@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from pydantic import Field
 
+from drivers.interface.kernel import kernel
 from drivers.interface.settings import Settings
 
 F32 = NDArray[np.float32]
@@ -34,7 +34,7 @@ class DepthNoiseSettings(Settings):
     dropout_probability: float = Field(default=0.002, ge=0.0, le=1.0, description="of a hole anywhere")
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _hole_probability(disparity: F32, leftmost: float, u: int, v: int, shadow: float, edge: float, dropout: float) -> float:
     """`leftmost`: the least column in the right image that anything to the right of this pixel projects to."""
     column = u - disparity[v, u]
@@ -53,7 +53,7 @@ def _hole_probability(disparity: F32, leftmost: float, u: int, v: int, shadow: f
     return max(edge, dropout) if jump > _DISPARITY_GRADIENT_LIMIT else dropout
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _spoil(
     depth: F32,
     normal: F32,

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from sim_drivers.scene import Mover
 
 F64 = NDArray[np.float64]
@@ -27,7 +27,7 @@ def pack_movers(movers: Sequence[Mover], mocap_ids: Sequence[int]) -> tuple[F64,
     return np.concatenate([np.zeros((0, 4)), *frames]), np.array(rows, dtype=np.int64).reshape(-1, 4)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def place_movers(time_s: float, keyframes: F64, spans: I64, mocap_pos: F64, mocap_quat: F64) -> None:
     """Write x and y, shape (mocaps, 3), and yaw, shape (mocaps, 4), as `Mover.pose_at` gives them; z is left as it is."""
     for mover in range(len(spans)):
@@ -45,7 +45,7 @@ def place_movers(time_s: float, keyframes: F64, spans: I64, mocap_pos: F64, moca
         mocap_quat[mocap, 0], mocap_quat[mocap, 3] = np.cos(yaw / 2.0), np.sin(yaw / 2.0)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _between(keyframes: F64, before: int, after: int, column: int, part: float) -> float:
     low = keyframes[before, column]
     return float(low + part * (keyframes[after, column] - low))

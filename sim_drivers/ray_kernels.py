@@ -10,8 +10,9 @@ conventions hold: a solid seen from inside is hit on its far side, a plane is hi
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from drivers.interface.kernel import kernel
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
@@ -23,7 +24,7 @@ _SLACK_M = 1e-6  # by which a sphere around a solid is larger than need be, so t
 _TINY = 1e-15  # MuJoCo's mjMINVAL: a direction shorter than this is parallel
 
 
-@njit(cache=True, nogil=True, inline="always")  # type: ignore[untyped-decorator]
+@kernel(inline=True)
 def _slab(o: float, d: float, half: float) -> tuple[float, float]:
     """Interval of |o + t d| <= half."""
     if abs(d) < _TINY:
@@ -32,7 +33,7 @@ def _slab(o: float, d: float, half: float) -> tuple[float, float]:
     return middle - reach, middle + reach
 
 
-@njit(cache=True, nogil=True, inline="always")  # type: ignore[untyped-decorator]
+@kernel(inline=True)
 def _quadratic(a: float, b: float, c: float) -> tuple[float, float]:
     """Interval of a t^2 + 2 b t + c <= 0, for a >= 0."""
     if a < _TINY:
@@ -44,7 +45,7 @@ def _quadratic(a: float, b: float, c: float) -> tuple[float, float]:
     return (-b - root) / a, (-b + root) / a
 
 
-@njit(cache=True, nogil=True, inline="always")  # type: ignore[untyped-decorator]
+@kernel(inline=True)
 def _box(size: Triple, o: Triple, d: Triple) -> tuple[float, float]:
     in_x, out_x = _slab(o[0], d[0], size[0])
     in_y, out_y = _slab(o[1], d[1], size[1])
@@ -52,7 +53,7 @@ def _box(size: Triple, o: Triple, d: Triple) -> tuple[float, float]:
     return max(in_x, in_y, in_z), min(out_x, out_y, out_z)
 
 
-@njit(cache=True, nogil=True, inline="always")  # type: ignore[untyped-decorator]
+@kernel(inline=True)
 def _cylinder(size: Triple, o: Triple, d: Triple) -> tuple[float, float]:
     flat, across = d[0] * d[0] + d[1] * d[1], o[0] * d[0] + o[1] * d[1]
     side_in, side_out = _quadratic(flat, across, o[0] * o[0] + o[1] * o[1] - size[0] * size[0])
@@ -60,7 +61,7 @@ def _cylinder(size: Triple, o: Triple, d: Triple) -> tuple[float, float]:
     return max(side_in, cap_in), min(side_out, cap_out)
 
 
-@njit(cache=True, nogil=True, inline="always")  # type: ignore[untyped-decorator]
+@kernel(inline=True)
 def _ellipsoid(size: Triple, o: Triple, d: Triple) -> tuple[float, float]:
     """A sphere too: the space is scaled until it is the unit sphere."""
     ox, oy, oz = o[0] / size[0], o[1] / size[1], o[2] / size[2]
@@ -71,7 +72,7 @@ def _ellipsoid(size: Triple, o: Triple, d: Triple) -> tuple[float, float]:
     return interval
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _capsule(size: Triple, o: Triple, d: Triple) -> tuple[float, float]:
     """The cylinder's side; where the ray passes that beyond an end, the end's sphere."""
     radius, half = size[0], size[1]
@@ -93,7 +94,7 @@ def _capsule(size: Triple, o: Triple, d: Triple) -> tuple[float, float]:
     return enter, leave
 
 
-@njit(cache=True, nogil=True, inline="always")  # type: ignore[untyped-decorator]
+@kernel(inline=True)
 def _plane(size: Triple, o: Triple, d: Triple) -> tuple[float, float]:
     if d[2] > -_TINY:
         return np.inf, -np.inf
@@ -102,7 +103,7 @@ def _plane(size: Triple, o: Triple, d: Triple) -> tuple[float, float]:
     return (t, t) if inside else (np.inf, -np.inf)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def first_hit(kind: int, size: Triple, o: Triple, d: Triple) -> float:
     """Return t of the nearest surface ahead, from local origin and direction; inf when the ray misses."""
     if kind == BOX:
@@ -121,7 +122,7 @@ def first_hit(kind: int, size: Triple, o: Triple, d: Triple) -> float:
     return nearest
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def cast_rays(
     kinds: I64,
     sizes: F64,

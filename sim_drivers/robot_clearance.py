@@ -6,9 +6,9 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from sim_drivers.ray_caster import subtree_geoms
 from sim_drivers.world import OBSTACLE_BIT
 
@@ -17,7 +17,7 @@ I64 = NDArray[np.int64]
 _FAR_M = 1e6  # mj_geomDistance never returns more
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _lower_bounds(pairs: I64, position: F64, rotation: F64, radius: F64, box: F64, bounds: F64) -> None:
     """Write, for pairs (n, 2) of robot geom and obstacle, the distance from the first's sphere to the second's own box (n,)."""
     for i in range(len(pairs)):

@@ -13,9 +13,9 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from sim_drivers.world import MujocoWorld
 
 F64 = NDArray[np.float64]
@@ -60,7 +60,7 @@ class Tyres:
         hold(self._bodies, data.cvel, centre, data.xpos, load_n, self._friction, data.xfrc_applied)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def hold(bodies: I64, motion: F64, centre: F64, place: F64, load_n: F64, friction: float, applied: F64) -> None:
     """Write the force and torque on each wheel that its grip on the floor makes.
 

@@ -90,7 +90,7 @@ def test_the_command_line_loads():
 def test_every_planner_folder_has_the_same_files(name):
     folder = ROOT / "planners" / name
     assert {"planner.py", "settings.py", "README.md"} <= {path.name for path in folder.iterdir()}
-    decorated = [path.name for path in folder.glob("*.py") if "njit" in path.read_text()]
+    decorated = [path.name for path in folder.glob("*.py") if "interface.kernel import" in path.read_text()]
     assert all(name.endswith("kernels.py") for name in decorated)  # compiled code stands in files that say so
 
 

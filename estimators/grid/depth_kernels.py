@@ -6,9 +6,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from estimators.belief import F64, U8
 
 U16 = NDArray[Any]
@@ -20,13 +20,13 @@ NOTHING = np.int32(np.iinfo(np.int32).min)  # what a pixel's ray that is not to 
 Ray = tuple[float, float, float]  # x, y and z in odom, per metre of depth
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _row_is_useless(lowest: float, highest: float, slab: tuple[float, float], range_min: float) -> bool:
     """Tell whether every ray of a row, with rises between the two given, has left the slab before the minimum range."""
     return lowest * range_min > slab[1] or highest * range_min < slab[0]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@kernel(numpy_division=True)
 def _end_rays(
     row: U16,  # (width,)
     raw_limits: tuple[int, int],
@@ -57,7 +57,7 @@ def _end_rays(
         clear_m[u] = max(clear_m[u], end if useful else 0.0)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _count(ends: I32, hits: I32, free_ends: U8) -> None:
     for end in ends:
         if end >= 0:
@@ -66,7 +66,7 @@ def _count(ends: I32, hits: I32, free_ends: U8) -> None:
             free_ends[~end] = 1
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def collect_depth(
     depth: U16,  # (height, width)
     raw_limits: tuple[int, int],  # lowest and highest raw value that is trusted
@@ -102,7 +102,7 @@ def collect_depth(
         _count(ends, hits.reshape(-1), free_ends.reshape(-1))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def outline_blind(
     camera: tuple[float, float],  # x, y in cells from the lattice's corner
     forward: tuple[float, float],  # the optical axis in odom, along the floor, unit length
@@ -127,7 +127,7 @@ def outline_blind(
                 blind[row, column] = not _is_seen_past(ahead, left, fx, cx, clear_cells)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _is_seen_past(ahead: float, left: float, fx: float, cx: float, clear_cells: F64) -> bool:
     half = math.sqrt(0.5)  # of a cell's diagonal
     nearest = max(ahead - half, 0.1)

@@ -9,8 +9,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from drivers.interface.kernel import kernel
 
 Occupied = NDArray[Any]  # (rows, columns) uint8, 1 or 0
 I64 = NDArray[np.int64]
@@ -18,21 +19,21 @@ I64 = NDArray[np.int64]
 _SIDES = 4  # lines that lead mostly up the rows, down the rows, up the columns, down the columns
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _from_side(side: int, rows: int, columns: int) -> tuple[int, int]:
     """Return how many cells a way of `rows` and `columns` leads along a side's direction, and how many across it."""
     along, across = (rows, columns) if side < 2 else (columns, rows)
     return (-along if side % 2 else along), across
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _sector(along: int, across: int, sectors: int) -> int:
     """Return in which of the sectors of its side a way leads."""
     slope = min(max(across / along, -1.0), 1.0)
     return int(0.5 * (slope + 1.0) * (sectors - 1))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def first_surfaces(occupied: Occupied, row0: int, column0: int) -> I64:
     """Return after how many cells from (row0, column0) a line may meet a surface, by side and sector, shape (4, sectors)."""
     rows, columns = occupied.shape
@@ -52,7 +53,7 @@ def first_surfaces(occupied: Occupied, row0: int, column0: int) -> I64:
     return first
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def may_meet(first: I64, rows: int, columns: int) -> bool:
     """Tell whether the line that leads on by `rows` and `columns` may meet a surface before its last cell; False is certain."""
     mostly_across = abs(columns) > abs(rows)

@@ -8,9 +8,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from estimators.belief import FREE, OCCUPIED, U8, UNKNOWN
 from estimators.grid.first_surfaces import first_surfaces, may_meet
 
@@ -18,7 +18,7 @@ Occupied = NDArray[Any]  # (rows, columns) uint8, 1 or 0
 Counts = NDArray[Any]  # (rows, columns) int32
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _step(row: int, column: int, error: int, rows: int, columns: int, up: int, right: int) -> tuple[int, int, int]:
     """Take one step of Bresenham's line that spans `rows` and `columns` cells in the directions `up` and `right`."""
     twice = 2 * error
@@ -31,7 +31,7 @@ def _step(row: int, column: int, error: int, rows: int, columns: int, up: int, r
     return row, column, error
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _trace_free(occupied: Occupied, label: U8, row0: int, column0: int, row1: int, column1: int, with_end: bool) -> None:
     """Mark the line's cells free up to its end, or up to the first occupied cell; it never slips between two diagonal ones."""
     rows, columns = abs(row1 - row0), abs(column1 - column0)
@@ -49,7 +49,7 @@ def _trace_free(occupied: Occupied, label: U8, row0: int, column0: int, row1: in
             return
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def touching(occupied: Occupied) -> U8:
     """Return 1 for every cell that is occupied or has an occupied one among its eight neighbours, shape (rows, columns)."""
     rows, columns = occupied.shape
@@ -61,7 +61,7 @@ def touching(occupied: Occupied) -> U8:
     return touches
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def is_hidden(occupied: Occupied, touches: U8, row0: int, column0: int, row1: int, column1: int) -> bool:
     """Tell whether another surface stands between the camera's cell (row0, column0) and the cell (row1, column1).
 
@@ -81,7 +81,7 @@ def is_hidden(occupied: Occupied, touches: U8, row0: int, column0: int, row1: in
     return False
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def label_cells(occupied: Occupied, hits: Counts, free_ends: U8, row0: int, column0: int, label: U8) -> None:
     """Write the labels of all cells as seen from the cell (row0, column0).
 

@@ -6,11 +6,11 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from pydantic import Field
 
 from drivers.interface.geometry import SE2
+from drivers.interface.kernel import kernel
 from drivers.interface.samples import RangeScan, Stamp, frozen_array
 from drivers.interface.sensed import Sensed
 from drivers.interface.settings import Settings
@@ -27,7 +27,7 @@ class ScanGridSettings(Settings):
     component_cells_min: int = Field(default=1, ge=1, le=100, description="smaller groups of occupied cells are noise")
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _collect_scan(
     range_cells: F64,  # (beams,)
     first_rad: float,  # in odom

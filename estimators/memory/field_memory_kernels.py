@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from estimators.belief import FREE, OCCUPIED, U8, UNKNOWN
 
 I64 = NDArray[Any]
@@ -14,7 +14,7 @@ Flags = NDArray[Any]  # bool
 Evidence = NDArray[Any]  # float32, 0 to 1
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _look(label: U8, seen: U8, blind: Flags, corner: tuple[int, int], at: tuple[int, int], scale: int) -> tuple[bool, ...]:
     """Overwrite the labels of one cell of the layers as they were seen.
 
@@ -39,7 +39,7 @@ def _look(label: U8, seen: U8, blind: Flags, corner: tuple[int, int], at: tuple[
     return hit, cleared, held, stands
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _forget(label: U8, row0: int, column0: int, scale: int) -> None:
     for row in range(row0, row0 + scale):
         for column in range(column0, column0 + scale):
@@ -47,7 +47,7 @@ def _forget(label: U8, row0: int, column0: int, scale: int) -> None:
                 label[row, column] = UNKNOWN
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def fold_layers(
     label: U8,  # (rows * scale, columns * scale), as last seen; all of these change in place
     static: Evidence,  # (rows, columns), as of stamp_ns

@@ -7,16 +7,16 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from estimators.belief import FREE, OCCUPIED, U8, UNKNOWN
 
 I64 = NDArray[Any]
 Flags = NDArray[Any]  # bool
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def fold(
     label: U8,  # (rows, columns), remembered; all of these change in place
     free_ns: I64,  # (rows, columns), when last seen free
@@ -54,7 +54,7 @@ def fold(
                     label[at] = UNKNOWN
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def free_disc(label: U8, x: float, y: float, radius: float) -> None:
     """Mark the cells free whose centres lie within a disc; centre and radius in cells from the lattice's corner."""
     rows, columns = label.shape

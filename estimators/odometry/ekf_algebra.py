@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter, KalmanFilter
-from numba import njit
 
+from drivers.interface.kernel import kernel
 from estimators.belief import F64
 from estimators.odometry.ekf_model import STATES
 from estimators.odometry.ekf_state import EkfState
@@ -65,20 +65,20 @@ class Algebra:
         return self._gate / surprise if surprise <= self._gate * self._skip_ratio else 0.0
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def squared_surprise(innovation: F64, covariance: F64, first: int, noise: F64) -> float:
     """Return the normalised innovation squared of three states from the `first` on, measured with a noise of shape (3, 3)."""
     scatter = covariance[first : first + 3, first : first + 3] + noise
     return float(innovation @ np.linalg.solve(scatter, innovation))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def symmetric(matrix: F64) -> F64:
     """Return the symmetric part of a square matrix."""
     return 0.5 * (matrix + matrix.T)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def inverse(matrix: F64) -> F64:
     """Return the inverse of a square matrix."""
     inverted = np.empty_like(matrix)

@@ -11,8 +11,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from drivers.interface.kernel import kernel
 from estimators.belief import F64
 
 STATES = 11
@@ -35,7 +35,7 @@ class Inertial(NamedTuple):
     force_std: float  # m/s^2/sqrt(Hz)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def moved(x: F64, inertial: Inertial, dt_s: float) -> tuple[F64, F64]:
     """Return the state after a time, shape (11,), and its Jacobian, shape (11, 11).
 
@@ -65,7 +65,7 @@ def moved(x: F64, inertial: Inertial, dt_s: float) -> tuple[F64, F64]:
     return after, jacobian
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def transition(x: F64, drive: Drive, walk_std: F64, dt_s: float) -> tuple[F64, F64, F64]:
     """Return the state after a time, the transition matrix and the covariance that the time adds: (11,), (11, 11), (11, 11).
 
@@ -88,7 +88,7 @@ def transition(x: F64, drive: Drive, walk_std: F64, dt_s: float) -> tuple[F64, F
     return after, jacobian, noise
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def without_way(x: F64, covariance: F64) -> tuple[F64, F64]:
     """Return state and covariance with a way that begins here, certain to be none: (11,), (11, 11)."""
     x, covariance = x.copy(), covariance.copy()

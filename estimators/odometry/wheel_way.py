@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from drivers.interface.kernel import kernel
 from drivers.interface.kinematics import WheelKinematics
 from drivers.interface.samples import WheelSample
 from estimators.belief import F64
@@ -88,7 +88,7 @@ class WheelModel:
         return WheelWay(np.zeros(3), np.zeros(3), self._still, self._still)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _way(
     columns: F64, turns: F64, rates: F64, elapsed_s: float, counting: F64, belief: tuple[float, ...]
 ) -> tuple[F64, F64, F64, F64]:
@@ -117,7 +117,7 @@ def _way(
     return vector, twist, covariance, grip
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def farthest(one: F64, other: F64) -> float:
     """Return by how much the wheel that differs most differs, both of shape (wheels,)."""
     most = 0.0

@@ -6,16 +6,16 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from estimators.belief import F64
 
 NO_LINE = -1
 CAUCHY = 2.385  # of the standard deviation: 95 % efficient where errors are normal (Zhang, Parameter estimation, 1997)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _is_beside(x: float, y: float, ends: F64, beyond_m: float) -> bool:
     """Tell whether a point's foot lies between a line's ends, shape (4,), or at most so far beyond."""
     dx, dy = ends[2] - ends[0], ends[3] - ends[1]
@@ -24,7 +24,7 @@ def _is_beside(x: float, y: float, ends: F64, beyond_m: float) -> bool:
     return bool(-beyond_m <= along <= length + beyond_m)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _variance(jacobian: F64, covariance: F64) -> float:
     total = 0.0
     for i in range(3):
@@ -33,7 +33,7 @@ def _variance(jacobian: F64, covariance: F64) -> float:
     return total
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def match_points(
     points: F64,  # (n, 2) in base
     piece: NDArray[Any],  # (n,) int64; points of no piece (negative) match nothing
@@ -70,7 +70,7 @@ def match_points(
                 nearest, line[i] = distance, k
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def normal_equations(
     points: F64,  # (n, 2) in base
     noise_m: F64,  # (n,), standard deviation of each

@@ -10,9 +10,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from drivers.interface.samples import DepthFrame, RangeScan
 from estimators.belief import F64
 from estimators.grid.depth_grid import SATURATED, DepthGridSettings
@@ -50,7 +50,7 @@ def points_of_scan(scan: RangeScan, range_min_m: float, range_max_m: float) -> F
     return np.stack((reach * np.cos(angle), reach * np.sin(angle)), axis=-1)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _rows_in_slab(first: float, step: float, slab: tuple[float, float], nearest: float, height: int) -> tuple[int, int]:
     """Return the first row and the one after the last whose rays are still in the slab at the nearest range.
 
@@ -62,7 +62,7 @@ def _rows_in_slab(first: float, step: float, slab: tuple[float, float], nearest:
     return max(0, math.floor(max(min(one, other), -1.0))), min(height, math.ceil(min(max(one, other), height)) + 1)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _collect_sectors(
     depth: NDArray[Any],  # (height, width) uint16
     raw_limits: tuple[int, int],
@@ -99,7 +99,7 @@ def _collect_sectors(
     return found
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _mean_near_median(x: F64, y: F64, reach: F64, ranges: tuple[float, float], mean: F64) -> bool:
     """Write the mean of the returns near the median range; False: that is out of range."""
     middle = np.median(reach)

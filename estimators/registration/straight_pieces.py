@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from estimators.belief import F64
 
 NO_PIECE = -1
@@ -45,12 +45,12 @@ def straight_pieces(points: F64, deviation_m: F64, gap_m: float, length_min_m: f
     return StraightPieces(points, piece, direction[:count])
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _distance(points: F64, one: int, other: int) -> float:
     return float(np.hypot(points[other, 0] - points[one, 0], points[other, 1] - points[one, 1]))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _farthest(points: F64, deviation_m: F64, first: int, last: int) -> tuple[int, float, float]:
     """Return which point between two lies farthest from the line through them beyond its deviation, how far beyond, and the
     distance of the two.
@@ -66,7 +66,7 @@ def _farthest(points: F64, deviation_m: F64, first: int, last: int) -> tuple[int
     return index, beyond, length
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _principal_direction(points: F64) -> tuple[float, float]:
     """Return the unit vector along which points, shape (n, 2), scatter most."""
     mean_x, mean_y = points[:, 0].mean(), points[:, 1].mean()
@@ -77,7 +77,7 @@ def _principal_direction(points: F64) -> tuple[float, float]:
     return np.cos(angle), np.sin(angle)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _split(
     points: F64, deviation_m: F64, gap_m: float, length_min_m: float, points_min: int, piece: NDArray[Any], direction: F64
 ) -> int:

@@ -5,16 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from estimators.belief import Mask
 
 Components = NDArray[Any]  # (rows, columns) int32, of each cell the component's number
 I64 = NDArray[np.int64]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def sizes(component: Components, cells: Mask, count: int) -> I64:
     """Return how many of some cells, shape (rows, columns), each component has, shape (count,)."""
     size = np.zeros(count, np.int64)
@@ -25,7 +25,7 @@ def sizes(component: Components, cells: Mask, count: int) -> I64:
     return size
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def cells_of(component: Components, chosen: Mask) -> Mask:
     """Return the cells, shape (rows, columns), of the components that are chosen, shape (count,)."""
     cells = np.empty(component.shape, np.bool_)
@@ -35,7 +35,7 @@ def cells_of(component: Components, chosen: Mask) -> Mask:
     return cells
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def extents(component: Components, count: int) -> I64:
     """Return how many columns and rows each component spans, shape (count, 2); the background, which is the first, none."""
     low, high = np.full((count, 2), max(component.shape), np.int64), np.full((count, 2), -1, np.int64)

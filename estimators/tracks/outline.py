@@ -10,8 +10,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from numba import njit
-
+from drivers.interface.kernel import kernel
 from estimators.belief import F64, FREE, U8
 
 ANCHOR = 0.5  # how many cells' worth the first guess counts, so that a short arc does not run away
@@ -37,7 +36,7 @@ class Outline(NamedTuple):
         return self.right_own and self.left_own
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def outline_of(points: F64, sensor_x: float, sensor_y: float, label: U8, x_m: float, y_m: float, cell_m: float) -> Outline:
     """Return the outline of a surface.
 
@@ -68,7 +67,7 @@ def outline_of(points: F64, sensor_x: float, sensor_y: float, label: U8, x_m: fl
     return Outline(sensor_x, sensor_y, middle + low, middle + high, nearest, right, left)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _sees_past(label: U8, x: float, y: float, bearing: float, away: float, sign: float) -> bool:
     """Tell whether there is free ground beside a cell, at its distance from the sensor; lengths in cells."""
     count = 0
@@ -91,7 +90,7 @@ def apparent_radius_m(seen: Outline) -> float:
     return seen.nearest_m * sine / (1.0 - sine)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def bearing_of(seen: Outline, radius: float) -> float:
     """Return in which direction [rad] the centre of a disc of a radius [m] lies: beside its one own side, else in the middle."""
     if seen.right_own == seen.left_own:
@@ -100,7 +99,7 @@ def bearing_of(seen: Outline, radius: float) -> float:
     return seen.right_rad + half if seen.right_own else seen.left_rad - half
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def centre_of(points: F64, seen: Outline, radius: float) -> tuple[float, float]:
     """Return the centre of a disc of known radius [m] whose edge the points, shape (n, 2), lie on, and which its own sides touch.
 

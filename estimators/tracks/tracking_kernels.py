@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from estimators.belief import FREE, OCCUPIED, U8
 
 I64 = NDArray[Any]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def count_left(label: U8, component: I64, seen_ns: I64, oldest_ns: int, left: I64) -> None:
     """Count the cells that each component has left, into `left`, shape (components + 1,).
 
@@ -38,7 +38,7 @@ def count_left(label: U8, component: I64, seen_ns: I64, oldest_ns: int, left: I6
     left[0] = 0
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _stands(label: U8, row: int, column: int, reach: int) -> bool:
     for i in range(row - reach, row + reach + 1):
         for j in range(column - reach, column + reach + 1):
@@ -47,7 +47,7 @@ def _stands(label: U8, row: int, column: int, reach: int) -> bool:
     return False
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _component_around(label: U8, component: I64, row: int, column: int) -> int:
     for i in range(row - 2, row + 3):
         for j in range(column - 2, column + 3):
@@ -56,7 +56,7 @@ def _component_around(label: U8, component: I64, row: int, column: int) -> int:
     return 0
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def keep_times(label: U8, seen_ns: I64, since_ns: I64, now_ns: int, oldest_ns: int, never_ns: int) -> None:
     """Note when cells are occupied, and since when; one that was seen free, or not occupied since `oldest_ns`, begins anew."""
     for row in range(label.shape[0]):

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from drivers.interface.kernel import kernel
 from estimators.belief import F64
 from planners.clearance_manifold.ridge_kernels import Demand, Sections, worth
 
@@ -15,7 +15,7 @@ STEEP = 2.0  # no branch is steeper: from one station to the next it would lead 
 AWAY = 4.0  # cost of a squared distance between the robot and its own station, per square metre
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def encounters(sections: Sections, offsets: F64, robot: F64, speed_m_s: float, horizon_s: float, closing: F64) -> F64:
     """Return how near what closes in comes to every station and offset once the robot can be there, shape (n, m) [m].
 
@@ -45,7 +45,7 @@ def encounters(sections: Sections, offsets: F64, robot: F64, speed_m_s: float, h
     return apart
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def station_costs(rho: F64, apart: F64, offsets: F64, demand: Demand) -> F64:
     """Return what it costs to pass each station at each offset, shape (n, m), in metres of clearance missed.
 
@@ -65,7 +65,7 @@ def station_costs(rho: F64, apart: F64, offsets: F64, demand: Demand) -> F64:
     return cost
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def cheapest_branch(costs: F64, offsets: F64, spacing_m: F64, start: float, turn: float) -> tuple[F64, float]:
     """Return the branch that costs least, shape (n,) [m], and what it costs.
 
@@ -103,7 +103,7 @@ def cheapest_branch(costs: F64, offsets: F64, spacing_m: F64, start: float, turn
     return y, least
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def cost_along(costs: F64, offsets: F64, spacing_m: F64, start: float, turn: float, y: F64) -> float:
     """Return what a branch, shape (n,), costs, as `cheapest_branch` counts."""
     n, m = costs.shape

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from drivers.interface.kernel import kernel
 from estimators.belief import F64
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def project(line: F64, step_m: float, points: F64, near_m: float, reach_m: float) -> F64:
     """Return arc length and lateral offset (left is positive), shape (n, 2) [m], of points, shape (n, 2), on a centre line.
 
@@ -45,7 +45,7 @@ def project(line: F64, step_m: float, points: F64, near_m: float, reach_m: float
     return out
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def point_at(line: F64, step_m: float, arc_m: float) -> tuple[float, float]:
     """Return the point of the line at an arc length; before its start and beyond its end it is straight."""
     last = len(line) - 1
@@ -54,7 +54,7 @@ def point_at(line: F64, step_m: float, arc_m: float) -> tuple[float, float]:
     return line[i, 0] + part * (line[i + 1, 0] - line[i, 0]), line[i, 1] + part * (line[i + 1, 1] - line[i, 1])
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def frames(line: F64, step_m: float, arcs_m: F64, half_width_m: float) -> tuple[F64, F64, F64]:
     """Return points, shape (n, 2), unit normals to the left, shape (n, 2), and reach of the cross-sections, shape (n, 2).
 

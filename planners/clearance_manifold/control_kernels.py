@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from drivers.interface.kernel import kernel
 from estimators.belief import F64, Mask
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def brakable(distance_m: float, deceleration_m_s2: float, delay_s: float) -> float:
     """Return the largest speed v with v delay + v^2 / (2 deceleration) <= distance [m/s].
 
@@ -19,7 +19,7 @@ def brakable(distance_m: float, deceleration_m_s2: float, delay_s: float) -> flo
     return float(np.sqrt(lead * lead + 2.0 * deceleration_m_s2 * max(distance_m, 0.0)) - lead)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def known_length(known: Mask, corner: F64, cell_m: float, points: F64, body_m: float, gap_m: float) -> float:
     """Return how far along a curve, shape (n, 2), the first stretch of unknown cells longer than `gap_m` begins [m].
 
@@ -46,7 +46,7 @@ def known_length(known: Mask, corner: F64, cell_m: float, points: F64, body_m: f
     return float(min(along, unknown_since))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def known_way(
     known: Mask, corner: F64, cell_m: float, robot: F64, along: F64, radius_m: float, body_m: float, gap_m: float, reach_m: float
 ) -> float:
@@ -71,7 +71,7 @@ def known_way(
     return max(free, 0.0)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def longitudinal(u_x: float, u_y: float, t_x: float, t_y: float, speed: float, cap_x: float, cap_y: float, low_x: float) -> float:
     """Return the largest k <= speed for which u + k t stays inside the caps; 0 where none above it does."""
     k = speed

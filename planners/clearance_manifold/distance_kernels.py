@@ -7,9 +7,9 @@ the transform runs over the cells that will be taken only: a few, in a few colum
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from estimators.belief import F32, F64, U8
 
 I64 = NDArray[np.int64]
@@ -17,7 +17,7 @@ I64 = NDArray[np.int64]
 FAR_CELLS = 30_000  # farther than any grid is long; its square fits into 32 bits
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def lowered(clearance: F32, taken: U8, cell_m: float) -> F32:
     """Return the clearance [m] with the cells `taken` occupied as well, shape (rows, columns).
 
@@ -49,7 +49,7 @@ def lowered(clearance: F32, taken: U8, cell_m: float) -> F32:
     return out
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def distances_along(taken: U8) -> tuple[I64, I64]:
     """Return the columns with taken cells, shape (n,), and how far each of their cells is from one, shape (n, rows) [cells]."""
     rows, columns = taken.shape
@@ -72,7 +72,7 @@ def distances_along(taken: U8) -> tuple[I64, I64]:
     return columns_of, along
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def envelope(columns_of: I64, along: I64, vertex: I64, begin: F64) -> int:
     """Find the lower envelope of parabolas (x - column)^2 + along^2; return the index of its last piece.
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from drivers.interface.kernel import kernel
 from estimators.belief import F64, Mask
 from estimators.field_query import bilinear
 from planners.clearance_manifold.ridge_kernels import Ground
@@ -14,7 +14,7 @@ EARLY, HALF = 0.3, 0.5  # shares of the time to an encounter: what is left late 
 SOONEST_S = 0.3  # nothing is answered faster than the base can
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def followed(
     velocity: F64, acceleration: F64, wanted: F64, jerk: float, urgent: float, most: float, response_per_s: float, dt: float
 ) -> tuple[F64, F64]:
@@ -50,7 +50,7 @@ def followed(
     return velocity + after * dt, after
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def jerk_to_stop(speed: float, distance: float) -> float:
     """Return the jerk with which a stop from `speed` takes `distance`: v^3 / d^2 [m/s^3]; infinite where there is no way left.
 
@@ -60,7 +60,7 @@ def jerk_to_stop(speed: float, distance: float) -> float:
     return speed * speed * speed / (distance * distance) if distance > 1e-6 else np.inf
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def jerk_to_pass(change: float, time_s: float) -> float:
     """Return the jerk that has changed a velocity by `change` early in the time, in 0.3 of it: 4 change / T^2 in T [m/s^3].
 
@@ -71,7 +71,7 @@ def jerk_to_pass(change: float, time_s: float) -> float:
     return 4.0 * change / (within_s * within_s)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def jerk_to_move(distance: float, time_s: float) -> float:
     """Return the constant jerk that moves a robot at rest by `distance` in half of a time: 6 d / T^3 in T [m/s^3].
 
@@ -82,7 +82,7 @@ def jerk_to_move(distance: float, time_s: float) -> float:
     return 6.0 * distance / (within_s * within_s * within_s)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def time_to_pass(robot: F64, closing: F64, near_m: float) -> float:
     """Return when what closes in, shape (5,), passes a robot at rest, shape (2,) [s]; infinite if it does not within `near_m`."""
     speed2 = closing[2] * closing[2] + closing[3] * closing[3]
@@ -94,7 +94,7 @@ def time_to_pass(robot: F64, closing: F64, near_m: float) -> float:
     return time if time > 0.0 and away < near_m else np.inf
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def room_along(ground: Ground, known: Mask, robot: F64, direction: F64, least_m: float, body_m: float, most_m: float) -> float:
     """Return how far the robot can go straight on until it has less clearance than `least_m` or has not seen the place [m].
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from drivers.interface.kernel import kernel
 from estimators.belief import F32, F64, Mask
 
 
@@ -30,7 +30,7 @@ class Seen(NamedTuple):
     cell_m: float
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def arrival(seen: Seen, x: float, y: float, out_x: float, out_y: float, unseen: Unseen) -> tuple[float, float]:
     """Return when somebody unseen can be `apart_m` from a point, coming along a ray, and from how far out [s, m].
 
@@ -80,7 +80,7 @@ def arrival(seen: Seen, x: float, y: float, out_x: float, out_y: float, unseen: 
     return end, out_of_view
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def arrivals(seen: Seen, at: F64, normal: F64, spacing_m: float, unseen: Unseen) -> tuple[F64, F64]:
     """Return when somebody can come from the right and from the left of points, and from how far out, each shape (n, 2).
 
@@ -108,7 +108,7 @@ def arrivals(seen: Seen, at: F64, normal: F64, spacing_m: float, unseen: Unseen)
     return when, whence
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def openings(when: F64, arcs_m: F64, unseen: Unseen) -> F64:
     """Return the stretches of the way that somebody can step into: where they begin and end, and when he may be there.
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from drivers.interface.kernel import kernel
 from estimators.belief import F64
 from planners.clearance_manifold.branch_kernels import BODY_M, EARLY
 from planners.clearance_manifold.ridge_kernels import Sections
@@ -14,7 +14,7 @@ ABREAST_M = 0.30  # so far past his middle somebody still is beside the robot
 SOONEST_S = 0.5  # nobody is evaded faster than the base can
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def meeting(point: F64, closing: F64) -> tuple[float, float]:
     """Return when what closes in passes a point [s], and how far to its left it has the point...
 
@@ -29,13 +29,13 @@ def meeting(point: F64, closing: F64) -> tuple[float, float]:
     return -(x * closing[2] + y * closing[3]) / speed2, float((y * closing[2] - x * closing[3]) / np.sqrt(speed2))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def runs_along(normal: F64, closing: F64) -> bool:
     """Return whether what closes in, shape (5,), moves along a way with this normal, shape (2,), unit."""
     return bool(abs(closing[2] * normal[0] + closing[3] * normal[1]) <= ALONG * np.hypot(closing[2], closing[3]))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def left_to(hand: float, sections: Sections, own: int, robot: F64, speed_m_s: float, closing: F64, least_m: float) -> F64:
     """Return what somebody who comes along the way leaves of the cross-sections on the robot's hand of him, shape (n, 2) [m].
 
@@ -70,7 +70,7 @@ def left_to(hand: float, sections: Sections, own: int, robot: F64, speed_m_s: fl
     return reach
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def give_way(u: F64, robot: F64, closing: F64, apart_m: float, horizon_s: float, hand: float) -> F64:
     """Return the velocity nearest to u, shape (2,), with which what closes in passes at `apart_m` if it goes on as it does.
 

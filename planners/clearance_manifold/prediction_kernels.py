@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from estimators.belief import F32, F64, U8, Mask
 
 MOVER_M = 0.8  # cells this near to each other belong to one boundary
@@ -26,7 +26,7 @@ class Arrival(NamedTuple):
     confidence_decay_s: float
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def observe(
     age_s: F32, known: Mask, corner: F64, cell_m: float, pose: F64, half_fov_rad: float, ranges_m: tuple[float, float, float],
     dt_s: float,
@@ -47,7 +47,7 @@ def observe(
             age_s[row, column] = np.float32(0.0) if seen else age_s[row, column] + np.float32(dt_s)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def taken_on_arrival(clearance: F32, rate: F32, age_s: F32, corner: F64, cell_m: float, robot: F64, arrival: Arrival) -> U8:
     """Return 1 where there is clearance now and equation 2 leaves none, 0 elsewhere, shape (rows, columns).
 
@@ -68,7 +68,7 @@ def taken_on_arrival(clearance: F32, rate: F32, age_s: F32, corner: F64, cell_m:
     return taken
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def nearest_closing(
     clearance: F32, rate: F32, recent: F32, window_s: float, corner: F64, cell_m: float, robot: F64, closing_m_s: float, most: int
 ) -> F64:
@@ -119,7 +119,7 @@ def nearest_closing(
     return out[:count]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _boundary(
     clearance: F32,
     rate: F32,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from drivers.interface.kernel import kernel
 from estimators.belief import F32, F64
 from estimators.field_query import bilinear
 
@@ -40,7 +40,7 @@ class Demand(NamedTuple):
     centring: float  # clearance that a metre nearer to the centre line is worth
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def clearance_at(ground: Ground, sections: Sections, i: int, y: float) -> float:
     """Return rho(xi_i, y) [m]."""
     value: float = bilinear(
@@ -50,13 +50,13 @@ def clearance_at(ground: Ground, sections: Sections, i: int, y: float) -> float:
     return value
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def worth(clearance: float, y: float, demand: Demand) -> float:
     """Return how good a ridge is: clearance as far as it counts, nearness to the centre line where it is enough."""
     return min(clearance, demand.enough_m) - demand.centring * abs(y)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def box_around(ground: Ground, sections: Sections, i: int, inside: float, step_m: float, demand: Demand) -> F64:
     """Return lower and upper end of the interval around `inside` with rho >= rho_min, and the ridge in it, shape (3,) [m].
 
@@ -82,7 +82,7 @@ def box_around(ground: Ground, sections: Sections, i: int, inside: float, step_m
     return found
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def ample_boxes(ground: Ground, sections: Sections, found: F64, step_m: float, demand: Demand) -> F64:
     """Return the part of each box around its ridge that keeps `ample_m`, or half of what the ridge has beyond rho_min, (n, 2).
 
@@ -113,7 +113,7 @@ def ample_boxes(ground: Ground, sections: Sections, found: F64, step_m: float, d
     return ample
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def profiles(ground: Ground, sections: Sections, offsets: F64) -> F64:
     """Return rho at every station and offset, shape (n, m); -1 beyond a section's reach."""
     rho = np.full((len(sections.at), len(offsets)), -1.0)
@@ -125,7 +125,7 @@ def profiles(ground: Ground, sections: Sections, offsets: F64) -> F64:
     return rho
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def repair(ground: Ground, sections: Sections, i: int, y: float, tube_m: float, hysteresis: float, demand: Demand) -> float:
     """Return the offset near `y` with the best clearance, a metre off costing `hysteresis`; NaN where none is wide enough."""
     low, high = max(y - tube_m, sections.reach[i, 0]), min(y + tube_m, sections.reach[i, 1])
@@ -139,7 +139,7 @@ def repair(ground: Ground, sections: Sections, i: int, y: float, tube_m: float, 
     return found
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def boxes(ground: Ground, sections: Sections, inside: F64, step_m: float, demand: Demand) -> F64:
     """Return `box_around` of every station, shape (n, 3); NaN where `inside`, shape (n,), is NaN or too narrow."""
     found = np.full((len(inside), 3), np.nan)
@@ -149,7 +149,7 @@ def boxes(ground: Ground, sections: Sections, inside: F64, step_m: float, demand
     return found
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def repair_all(
     ground: Ground, sections: Sections, predicted: F64, tubes_m: F64, own: int, hysteresis: float, demand: Demand
 ) -> tuple[F64, int]:
@@ -164,7 +164,7 @@ def repair_all(
     return y, good - own
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def along_manifold(ground: Ground, points: F64) -> F64:
     """Return the predicted clearance at points in odom, shape (n, 2), as shape (n,) [m]."""
     rho = np.empty(len(points))

@@ -8,9 +8,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from estimators.belief import UNKNOWN
 from estimators.field_query import bilinear
 
@@ -41,7 +41,7 @@ class Objective(NamedTuple):
     weights: F64  # (6,): progress, facing, clearance, speed, blind, change
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def advance(pose: F64, twist: F64, time_s: float) -> tuple[float, float, float]:
     """Return x, y, yaw after moving with a constant body twist, shape (3,), from a pose, shape (3,), along the exact arc."""
     angle = twist[2] * time_s
@@ -54,7 +54,7 @@ def advance(pose: F64, twist: F64, time_s: float) -> tuple[float, float, float]:
     return pose[0] + c * forward - s * left, pose[1] + s * forward + c * left, pose[2] + angle
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def is_unknown(around: Surroundings, x: float, y: float) -> bool:
     """Return whether a point was never seen; outside the grid nothing was."""
     row = int(np.floor((y - around.corner_y) / around.cell_m))
@@ -63,7 +63,7 @@ def is_unknown(around: Surroundings, x: float, y: float) -> bool:
     return not (0 <= row < rows and 0 <= column < columns) or around.label[row, column] == UNKNOWN
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def free_travel(pose: F64, twist: F64, length_m: float, steps: int, around: Surroundings) -> tuple[float, float]:
     """Return how far the robot's centre can go along the arc before its clearance is short, and the least clearance till there.
 
@@ -92,7 +92,7 @@ def free_travel(pose: F64, twist: F64, length_m: float, steps: int, around: Surr
     return length_m, least
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def worth(pose: F64, twist: F64, now: F64, free_m: float, least_m: float, required_m: float, goal: Objective) -> float:
     """Return the objective of one velocity, shape (3,): the sum that section IV-B maximises, with terms for an omni base."""
     speed = np.hypot(twist[0], twist[1])
@@ -111,7 +111,7 @@ def worth(pose: F64, twist: F64, now: F64, free_m: float, least_m: float, requir
     return float(gain - w[4] * blind - w[5] * change)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def choose(
     pose: F64, now: F64, samples: F64, stop_deceleration: F64, reaction_s: float, horizon_s: float, least_look_m: float,
     steps: int, around: Surroundings, goal: Objective,
@@ -151,7 +151,7 @@ def choose(
     return best, admissible, best_worth, best_free
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def visible_along(path: F64, look_ahead_m: float, around: Surroundings) -> int:
     """Return the farthest point of the path, shape (n, 2), within the look-ahead that a straight line from its start reaches.
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from estimators.field_query import bilinear
 
 F64 = NDArray[np.float64]
@@ -44,13 +44,13 @@ class Field(NamedTuple):
     required_m: float  # least clearance of the robot's centre
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def wrapped(angle: float) -> float:
     """Return the angle in [-pi, pi)."""
     return float((angle + np.pi) % (2.0 * np.pi) - np.pi)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def curvature_of(distance_m: float, phi: float, delta: float, k_phi: float, k_delta: float) -> float:
     """Return the curvature [1/m] of equation 13; `phi` (the paper's theta) is the target's heading and `delta` the robot's.
 
@@ -60,7 +60,7 @@ def curvature_of(distance_m: float, phi: float, delta: float, k_phi: float, k_de
     return float(-(steering + (1.0 + k_phi / (1.0 + (k_phi * phi) ** 2)) * np.sin(delta)) / distance_m)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def smooth(pose: F64, target: F64, law: Law) -> tuple[float, float]:
     """Return speed [m/s] and turn [rad/s] from a pose towards a target pose, both (3,) (equations 14 and 15).
 
@@ -77,14 +77,14 @@ def smooth(pose: F64, target: F64, law: Law) -> tuple[float, float]:
     return (turn / curvature if curvature != 0.0 else speed), turn
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def rotation(angle_rad: float, law: Law) -> float:
     """Return the turn on the spot [rad/s] by an angle: in proportion, but no slower than the base turns smoothly."""
     rate = min(max(law.rotation_gain * abs(angle_rad) * law.turn_rad_s, law.least_turn_rad_s), law.turn_rad_s)
     return float(np.copysign(rate, angle_rad))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def simulate(pose: F64, target: F64, law: Law, field: Field, way: F64) -> tuple[int, float, float]:
     """Follow the law from a pose to a target pose, both (3,), and write the poses to `way`, shape (n, 3).
 
@@ -118,7 +118,7 @@ def simulate(pose: F64, target: F64, law: Law, field: Field, way: F64) -> tuple[
     return steps, first_speed, first_turn
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def choose(pose: F64, targets: F64, aim: bool, law: Law, field: Field, nearest: int, way: F64) -> tuple[int, int, float, float]:
     """Return the farthest target of those, shape (n, 3), that the law reaches without collision; -1 when it reaches none.
 

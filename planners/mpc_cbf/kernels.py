@@ -7,13 +7,14 @@ function, ACC 2021, section III.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from drivers.interface.kernel import kernel
 
 F64 = NDArray[np.float64]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def rollout(state: F64, inputs: F64, step_s: float) -> F64:
     """Return the states x, y, yaw, shape (n + 1, 3), from the first, shape (3,), under speed and rate, shape (n, 2).
 
@@ -29,7 +30,7 @@ def rollout(state: F64, inputs: F64, step_s: float) -> F64:
     return states
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def linearised(states: F64, inputs: F64, step_s: float) -> F64:
     """Return the derivatives of each step that are neither 0 nor 1, shape (n, 7).
 
@@ -46,7 +47,7 @@ def linearised(states: F64, inputs: F64, step_s: float) -> F64:
     return slopes
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def barriers(states: F64, centre: F64, velocity: F64, radius_m: F64, step_s: float) -> tuple[F64, F64]:
     """Return h = |p - o| - r, shape (n + 1, m) [m], and its gradient, shape (n + 1, m, 2), for m discs that move on.
 
@@ -66,7 +67,7 @@ def barriers(states: F64, centre: F64, velocity: F64, radius_m: F64, step_s: flo
     return value, gradient
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def fall(value: F64, gamma: float) -> F64:
     """Return by how much each barrier falls below what it may at each step, shape (n, m) [m]; negative when it does not.
 

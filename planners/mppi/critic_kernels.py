@@ -9,16 +9,15 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from drivers.interface.kernel import kernel
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 FREE, INSCRIBED = 0.0, 253.0  # a costmap's values; from `INSCRIBED` on the robot touches something
-
-_FAST = {"contract", "reassoc", "arcp", "nsz"}
 
 
 class Costmap(NamedTuple):
@@ -30,7 +29,7 @@ class Costmap(NamedTuple):
     per_m: np.float32  # cells
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def inflate(clearance: F32, required_m: float, radius_m: float, scaling: float, cost: F32) -> None:
     """Write the costs of a costmap's inflation layer, shape (rows, columns), of places with that much clearance.
 
@@ -48,7 +47,7 @@ def inflate(clearance: F32, required_m: float, radius_m: float, scaling: float, 
                 cost[row, column] = FREE
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def cost_at(around: Costmap, x: np.float32, y: np.float32) -> float:
     """Return the cost of the cell around (x, y); outside the map there is nothing known to collide with."""
     column, row = int(np.floor((x - around.corner_x) * around.per_m)), int(np.floor((y - around.corner_y) * around.per_m))
@@ -57,7 +56,7 @@ def cost_at(around: Costmap, x: np.float32, y: np.float32) -> float:
     return FREE
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def collision_free(around: Costmap, points: F32) -> Mask:
     """Return which of the points, shape (n, 2), the robot's centre may be at, shape (n,)."""
     free = np.empty(len(points), np.bool_)
@@ -66,7 +65,7 @@ def collision_free(around: Costmap, points: F32) -> Mask:
     return free
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def obstacles(
     x: F32, y: F32, around: Costmap, weight: float, collision: float, preferring: bool, costs: F32
 ) -> int:  # fmt: skip
@@ -92,7 +91,7 @@ def obstacles(
     return free
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)  # type: ignore[untyped-decorator]
+@kernel(fast=True)
 def constraints(controls: F32, lowest: F32, highest: F32, dt: float, weight: float, costs: F32) -> None:
     """Charge the way that is driven with more than the speed admitted: of both axes together for a base that can strafe."""
     _, steps, batch = controls.shape
@@ -107,7 +106,7 @@ def constraints(controls: F32, lowest: F32, highest: F32, dt: float, weight: flo
             costs[b] += scale * max(speed - (fastest if vx > 0.0 else fastest_back), np.float32(0.0))
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)  # type: ignore[untyped-decorator]
+@kernel(fast=True)
 def backwards(controls: F32, dt: float, weight: float, costs: F32) -> None:
     """Charge the way driven in reverse."""
     _, steps, batch = controls.shape
@@ -117,7 +116,7 @@ def backwards(controls: F32, dt: float, weight: float, costs: F32) -> None:
             costs[b] += scale * max(-controls[0, k, b], np.float32(0.0))
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)  # type: ignore[untyped-decorator]
+@kernel(fast=True)
 def twirling(controls: F32, weight: float, costs: F32) -> None:
     """Charge the mean rate of turning."""
     _, steps, batch = controls.shape
@@ -127,7 +126,7 @@ def twirling(controls: F32, weight: float, costs: F32) -> None:
             costs[b] += scale * abs(controls[2, k, b])
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)  # type: ignore[untyped-decorator]
+@kernel(fast=True)
 def goal_distance(x: F32, y: F32, goal_x: np.float32, goal_y: np.float32, weight: float, costs: F32) -> None:
     """Charge the mean distance to the goal."""
     steps, batch = x.shape
@@ -138,7 +137,7 @@ def goal_distance(x: F32, y: F32, goal_x: np.float32, goal_y: np.float32, weight
             costs[b] += scale * np.sqrt(dx * dx + dy * dy)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def goal_angle(yaw: F32, goal_yaw: float, weight: float, costs: F32) -> None:
     """Charge the mean angle to the heading asked for at the goal."""
     steps, batch = yaw.shape
@@ -147,7 +146,7 @@ def goal_angle(yaw: F32, goal_yaw: float, weight: float, costs: F32) -> None:
             costs[b] += weight / steps * abs((yaw[k, b] - goal_yaw + np.pi) % (2.0 * np.pi) - np.pi)
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)  # type: ignore[untyped-decorator]
+@kernel(fast=True)
 def furthest_reached(x: F32, y: F32, path: F32) -> int:
     """Return the path's furthest point that is nearest to the end of some trajectory."""
     batch = x.shape[1]
@@ -161,7 +160,7 @@ def furthest_reached(x: F32, y: F32, path: F32) -> int:
     return int(nearest.max())
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)  # type: ignore[untyped-decorator]
+@kernel(fast=True)
 def path_distance(
     x: F32, y: F32, start_x: np.float32, start_y: np.float32, path: F32, open_: Mask, every: int, weight: float, costs: F32
 ) -> None:
@@ -191,7 +190,7 @@ def path_distance(
         costs[b] += np.float32(weight) * total[b] / max(count[b], np.float32(1.0))
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)  # type: ignore[untyped-decorator]
+@kernel(fast=True)
 def end_distance(x: F32, y: F32, to_x: np.float32, to_y: np.float32, weight: float, costs: F32) -> None:
     """Charge the distance from a trajectory's end to a point of the path."""
     for b in range(x.shape[1]):
@@ -199,7 +198,7 @@ def end_distance(x: F32, y: F32, to_x: np.float32, to_y: np.float32, weight: flo
         costs[b] += np.float32(weight) * np.sqrt(dx * dx + dy * dy)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def end_angle(x: F32, y: F32, yaw: F32, to_x: np.float32, to_y: np.float32, weight: float, costs: F32) -> None:
     """Charge the angle at a trajectory's end between its heading and the bearing of a point of the path."""
     for b in range(x.shape[1]):

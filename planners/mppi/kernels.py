@@ -8,15 +8,14 @@ that the inner loops are vectorised over trajectories.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from drivers.interface.kernel import kernel
 
 F32 = NDArray[np.float32]
 
-_FAST = {"contract", "reassoc", "arcp", "nsz"}
 
-
-@njit(cache=True, nogil=True, fastmath=_FAST)  # type: ignore[untyped-decorator]
+@kernel(fast=True)
 def sample_controls(sequence: F32, noise: F32, now: F32, reach: F32, controls: F32) -> None:
     """Write to `controls`, shape (3, steps, batch), the sequence, shape (3, steps), with noise of the same shape added.
 
@@ -34,7 +33,7 @@ def sample_controls(sequence: F32, noise: F32, now: F32, reach: F32, controls: F
                 controls[axis, k, b] = min(max(wanted, before - reach[axis]), before + reach[axis])
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)  # type: ignore[untyped-decorator]
+@kernel(fast=True)
 def roll_out(controls: F32, pose: F32, dt: np.float32, x: F32, y: F32, yaw: F32) -> None:
     """Write where the controls, shape (3, steps, batch), lead from a pose, shape (3,): x, y, yaw, each shape (steps, batch).
 
@@ -59,7 +58,7 @@ def roll_out(controls: F32, pose: F32, dt: np.float32, x: F32, y: F32, yaw: F32)
             cosine[b], sine[b] = c * cx - s * sx, s * cx + c * sx
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)  # type: ignore[untyped-decorator]
+@kernel(fast=True)
 def charge_change(controls: F32, sequence: F32, price: F32, costs: F32) -> None:
     """Add to the costs, shape (batch,), what leaving the sequence, shape (3, steps), costs at `price`, shape (3,).
 
@@ -74,7 +73,7 @@ def charge_change(controls: F32, sequence: F32, price: F32, costs: F32) -> None:
                 costs[b] += factor * (controls[axis, k, b] - u)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def average(controls: F32, costs: F32, temperature: float) -> tuple[F32, float]:
     """Return the mean of the controls weighted by exp(-cost / temperature), shape (3, steps), and the effective sample size."""
     axes, steps, batch = controls.shape
@@ -95,7 +94,7 @@ def average(controls: F32, costs: F32, temperature: float) -> tuple[F32, float]:
     return mean, total * total / squares
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def limit(sequence: F32, now: F32, reach: F32, lowest: F32, highest: F32) -> None:
     """Keep a sequence, shape (3, steps), inside the caps and accelerations, each shape (3,), in place."""
     axes, steps = sequence.shape

@@ -7,13 +7,14 @@ A half-plane holds the velocities v with normal . v >= bound.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from drivers.interface.kernel import kernel
 
 F64 = NDArray[np.float64]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def way_out(px: float, py: float, vx: float, vy: float, radius_m: float, horizon_s: float) -> tuple[float, float, float]:
     """Return the outward unit normal at the boundary point of a velocity obstacle nearest to v, and how far v is inside it.
 
@@ -35,7 +36,7 @@ def way_out(px: float, py: float, vx: float, vy: float, radius_m: float, horizon
     return normal_x, normal_y, -(normal_x * vx + normal_y * vy)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def agent_half_planes(
     offset: F64, velocity: F64, radius_m: F64, own: F64, share: float, horizon_s: float, period_s: float
 ) -> tuple[F64, F64]:
@@ -69,7 +70,7 @@ def agent_half_planes(
     return normals, bounds
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def standing_half_planes(offset: F64, radius_m: float, horizon_s: float) -> tuple[F64, F64]:
     """Return normals, shape (n, 2), and bounds, shape (n,) [m/s], of the velocities that do not reach n points within a time.
 

@@ -7,8 +7,9 @@ program is that of de Berg et al., Computational Geometry, section 4.4.  A half-
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from drivers.interface.kernel import kernel
 
 F64 = NDArray[np.float64]
 
@@ -17,7 +18,7 @@ _TOLERANCE = 1e-9  # m/s
 _FAR = 1e4  # m/s: the nearest point to one so far away is the extreme one in its direction
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def nearest_on_edge(normals: F64, bounds: F64, edge: int, wanted: F64) -> tuple[bool, float, float]:
     """Return whether the edge of a half-plane meets all earlier ones, and its point in them nearest to the wanted one."""
     nx, ny = normals[edge, 0], normals[edge, 1]
@@ -39,7 +40,7 @@ def nearest_on_edge(normals: F64, bounds: F64, edge: int, wanted: F64) -> tuple[
     return True, x - ny * at, y + nx * at
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def nearest_inside(normals: F64, bounds: F64, wanted: F64) -> tuple[int, F64]:
     """Return the point, shape (2,), of the intersection of n half-planes nearest to the wanted one, shape (2,).
 
@@ -57,7 +58,7 @@ def nearest_inside(normals: F64, bounds: F64, wanted: F64) -> tuple[int, F64]:
     return len(bounds), best
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def least_violation(normals: F64, bounds: F64, hard: int, start: F64) -> tuple[F64, float]:
     """Return the point, shape (2,), that violates the worst soft half-plane least, and by how much [m/s].
 
@@ -91,7 +92,7 @@ def least_violation(normals: F64, bounds: F64, hard: int, start: F64) -> tuple[F
     return best, granted
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def choose_velocity(normals: F64, bounds: F64, hard: int, wanted: F64) -> tuple[F64, float]:
     """Return the permitted velocity nearest to the wanted one, shape (2,), and the violation that had to be granted [m/s].
 

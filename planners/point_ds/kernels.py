@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from drivers.interface.kernel import kernel
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def attraction(x: float, y: float, gain_per_s: float, speed_m_s: float) -> tuple[float, float]:
     """Return the velocity towards an attractor at (x, y) from the robot [m], in the same frame, at most `speed_m_s` [m/s].
 
@@ -22,7 +23,7 @@ def attraction(x: float, y: float, gain_per_s: float, speed_m_s: float) -> tuple
     return gain * x, gain * y
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def within(vx: float, vy: float, low_x: float, high_x: float, high_y: float) -> tuple[float, float]:
     """Return the velocity shrunk, direction kept, until low_x <= vx <= high_x and |vy| <= high_y [m/s]; low_x <= 0.
 

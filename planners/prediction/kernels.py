@@ -9,8 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from drivers.interface.kernel import kernel
 
 F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
@@ -36,7 +37,7 @@ class Draws(NamedTuple):
 HOLD = 13  # steps
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})  # type: ignore[untyped-decorator]
+@kernel(fast=True, numpy_division=True)
 def advance(draws: Draws, m: int, steps_s: F64, robot: F32, out: F32) -> None:
     """Write where obstacle m is after each step, in every scenario, into out, shape (steps, 2, scenarios).
 
@@ -89,7 +90,7 @@ def advance(draws: Draws, m: int, steps_s: F64, robot: F32, out: F32) -> None:
             out[k, 1, i] = y[i]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def propagate(draws: Draws, steps_s: F64, robot: F32) -> F32:
     """Return the futures of all obstacles, shape (steps, obstacles, 2, scenarios), beside one motion of the robot, (steps, 2)."""
     obstacles, _, n = draws.position.shape
@@ -99,7 +100,7 @@ def propagate(draws: Draws, steps_s: F64, robot: F32) -> F32:
     return futures
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def drawn_starts(
     mean: F64, spread: F64, coefficients: F64, edges: F64, uniform: F32, normal: F32, push: F32, contact: F64, cap: F64,
     range_m: float,
@@ -145,7 +146,7 @@ def drawn_starts(
     return Draws(position, velocity, push, of[0], of[1], of[2], of[3], of[4], contact_m, range_m), which
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def places_of(now: NDArray[np.int64], before: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return where in `before` each identity of `now` stands, shape (len(now),); -1: it is new."""
     places = np.full(len(now), -1)
@@ -156,7 +157,7 @@ def places_of(now: NDArray[np.int64], before: NDArray[np.int64]) -> NDArray[np.i
     return places
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def followed(
     mean_before: F64, spread_before: F64, places: NDArray[np.int64], coefficients: F64, observed: F64, noise: F64, contact: F64,
     robot: F64, range_m: float, dt_s: float,
@@ -196,7 +197,7 @@ def followed(
     return mean, spread, likelihood
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def carried(s: F64, p: F64, coefficients: F64, contact: float, robot: F64, range_m: float, dt_s: float) -> None:
     """Carry one belief, state s of shape (4,) and spread p of shape (3,), over dt under a conjecture (equation of appendix B)."""
     factor, slowing, pursuit, least, acceleration = coefficients[:5]
@@ -213,7 +214,7 @@ def carried(s: F64, p: F64, coefficients: F64, contact: float, robot: F64, range
     p[2] += q * dt_s * dt_s
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def corrected(s: F64, p: F64, coefficients: F64, observed: F64, noise: F64) -> float:
     """Correct one belief with an observation, shape (4,); return the logarithm of its predictive density."""
     sigma_p, sigma_v = coefficients[5], coefficients[6]

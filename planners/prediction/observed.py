@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from estimators.belief import F64, Mask, Track
 
 
@@ -38,7 +38,7 @@ def observed(tracks: tuple[Track, ...]) -> Observed:
     return Observed(rows[:, 0].astype(np.int64), rows[:, 1:5].copy(), spread, rows[:, 5].copy(), len(tracks) - len(rows))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _spreads(rows: F64, covariance: F64) -> tuple[Mask, F64]:
     """Return which tracks are finite, shape (n,), and the variances of position, covariances, variances of velocity, (n, 3)."""
     sound, spread = np.empty(len(rows), np.bool_), np.empty((len(rows), 3))

@@ -6,12 +6,12 @@ Source: Han, Zhu, RCSP, algorithm 1 (line 3) and appendix A.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from drivers.interface.kernel import kernel
 from estimators.belief import F64
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def floored(weights: F64, floor: float) -> F64:
     """Return weights, shape (conjectures,), none of which is below the floor; the others keep their proportions.
 
@@ -30,7 +30,7 @@ def floored(weights: F64, floor: float) -> F64:
     return raised
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def updated(weights: F64, log_likelihood: F64, temperature: float, floor: float) -> F64:
     """Return q_t proportional to q_{t-1} l_t^(1/tau), then floored; shapes (rows, conjectures).
 
@@ -45,7 +45,7 @@ def updated(weights: F64, log_likelihood: F64, temperature: float, floor: float)
     return posterior
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def heaviest(weights: F64, count: int) -> F64:
     """Return weights, shape (rows, conjectures), with all but the `count` largest of a row zero and the rest summing to one.
 

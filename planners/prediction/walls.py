@@ -8,9 +8,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from estimators.belief import Mask
 
 F64 = NDArray[np.float64]
@@ -30,8 +30,8 @@ class Walls(NamedTuple):
     cell_m: float
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def slid(field: F32, row: int, column: int, dx: np.float32, dy: np.float32) -> tuple[np.float32, np.float32]:
+@kernel()
+def slid(field: F32, row: np.uint32, column: np.uint32, dx: np.float32, dy: np.float32) -> tuple[np.float32, np.float32]:
     """Return what is left of a motion, (dx, dy), from a cell before a wall: its part towards it is taken away.
 
     Where the field does not say where the wall is, nothing is left.
@@ -46,7 +46,7 @@ def slid(field: F32, row: int, column: int, dx: np.float32, dy: np.float32) -> t
     return dx - towards * across / squared, dy - towards * up / squared
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def keep_out(position: F32, radius: F64, walls: Walls) -> None:
     """Change futures, shape (steps, obstacles, 2, scenarios), so that nobody goes through a wall; what follows moves along.
 
@@ -64,7 +64,7 @@ def keep_out(position: F32, radius: F64, walls: Walls) -> None:
                 _keep_out(position[:, m, :, i], limit, walls)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _meet(own: F32, limit: np.float32, walls: Walls, meets: Mask) -> None:
     """Write which of the futures of one obstacle, shape (steps, 2, scenarios), come within a limit of a wall, (scenarios,)."""
     field, per_cell, one = walls.clearance, np.float32(1.0 / walls.cell_m), np.float32(1.0)
@@ -79,7 +79,7 @@ def _meet(own: F32, limit: np.float32, walls: Walls, meets: Mask) -> None:
                 meets[i] |= field[np.uint32(row), np.uint32(column)] < limit
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _keep_out(way: F32, limit: np.float32, walls: Walls) -> None:
     """Change one future of one obstacle, shape (steps, 2)."""
     field, per_cell, own = walls.clearance, np.float32(1.0 / walls.cell_m), np.float32(_OWN_M * _OWN_M)

@@ -6,19 +6,18 @@ Source: Han, Zhu, RCSP, section 4.3, algorithm 1 (line 4).
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from planners.risk import extremes
 
 F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
-FAST = {"contract", "reassoc", "arcp", "nsz"}
 
 _ROUNDING = 1e-5  # share by which a squared distance that is worked out in another order may differ, and more
 
 
-@njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[untyped-decorator]
+@kernel(fast=True)
 def squared_gaps(x: F32, y: F32, box: F32, gap: F32) -> None:
     """Write the squared distances of every motion from the box around an obstacle's futures at each step.
 
@@ -39,7 +38,7 @@ def squared_gaps(x: F32, y: F32, box: F32, gap: F32) -> None:
             out[u] = gap_x * gap_x + gap_y * gap_y
 
 
-@njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[untyped-decorator]
+@kernel(fast=True)
 def nearest_squared(x: F32, y: F32, own: F32, steps: NDArray[np.int64], best: F32) -> None:
     """Lower best, shape (scenarios,), to the least squared distance to an obstacle over some steps, four of them at a time.
 
@@ -71,7 +70,7 @@ def nearest_squared(x: F32, y: F32, own: F32, steps: NDArray[np.int64], best: F3
             best[i] = to_a if to_a < best[i] else best[i]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def boxes(own: F32) -> F32:
     """Return the box around all scenarios at each step, shape (4, steps), of futures of shape (steps, 2, scenarios)."""
     box = np.empty((4, len(own)), np.float32)
@@ -81,14 +80,14 @@ def boxes(own: F32) -> F32:
     return box
 
 
-@njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[untyped-decorator]
+@kernel(fast=True)
 def not_below(best: F32, least: np.float32) -> None:
     """Raise squared distances, shape (scenarios,), to a least one."""
     for i in range(len(best)):
         best[i] = best[i] if best[i] > least else least
 
 
-@njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[untyped-decorator]
+@kernel(fast=True)
 def lower_clearance(best: F32, contact: np.float32, clearance: F32) -> None:
     """Lower clearances, shape (scenarios,), to what least squared distances to one more obstacle leave."""
     for i in range(len(best)):
@@ -96,7 +95,7 @@ def lower_clearance(best: F32, contact: np.float32, clearance: F32) -> None:
         clearance[i] = c if c < clearance[i] else clearance[i]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def with_rest(motion: F32, rest: F32, steps: int) -> F32:
     """Return one coordinate of every motion, shape (commands, horizon), with where it rests, (commands,), for what follows."""
     whole = np.empty((len(motion), steps), np.float32)
@@ -106,7 +105,7 @@ def with_rest(motion: F32, rest: F32, steps: int) -> F32:
     return whole
 
 
-@njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[untyped-decorator]
+@kernel(fast=True)
 def count_near(gap: F32, limit: np.float32, count: F32) -> None:
     """Write how many steps of each command are nearer than a squared distance: gap (steps, commands), count (commands,)."""
     one, zero = np.float32(1.0), np.float32(0.0)
@@ -117,7 +116,7 @@ def count_near(gap: F32, limit: np.float32, count: F32) -> None:
             count[u] += one if own[u] < limit else zero
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def list_near(gap: F32, limit: np.float32, u: int, near: NDArray[np.int64]) -> None:
     """Write which steps of command u are nearer than a squared distance, from the front of near, shape (steps + 1,)."""
     count = 0
@@ -126,7 +125,7 @@ def list_near(gap: F32, limit: np.float32, u: int, near: NDArray[np.int64]) -> N
         count += gap[k, u] < limit
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def clearances(x: F32, y: F32, rest: F32, futures: F32, contact: F32, far_m: float) -> F32:
     """Return the least clearance of each command in each scenario over time and obstacles, shape (commands, scenarios).
 
@@ -179,7 +178,7 @@ def clearances(x: F32, y: F32, rest: F32, futures: F32, contact: F32, far_m: flo
     return clearance
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def least_gap(state: F64, contact: F64, x: float, y: float) -> float:
     """Return the least clearance of the robot from obstacles, states of shape (obstacles, 4); infinite where there are none."""
     least = np.inf

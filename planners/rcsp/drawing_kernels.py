@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from drivers.interface.kernel import kernel
 
 F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def first_conflict(x: F32, y: F32, futures: F32, contact: F32, count: int) -> int:
     """Return the first step at which a motion of shape (steps,) touches an obstacle in `count` scenarios or more; -1: never."""
     steps, obstacles, _, n = futures.shape
@@ -25,7 +26,7 @@ def first_conflict(x: F32, y: F32, futures: F32, contact: F32, count: int) -> in
     return -1
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def by_conjecture(
     position: F32, which: NDArray[np.int64], conjectures: int, every: int, shown: int
 ) -> tuple[F64, NDArray[np.int64]]:
@@ -45,7 +46,7 @@ def by_conjecture(
     return dots, edges
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def by_objective(x: F32, y: F32, objective: F64, free: NDArray[np.bool_], limits: F64) -> tuple[F64, NDArray[np.int64]]:
     """Return the ends of the motions, shape (commands, 2), the free ones by the first of the limits, which fall, that their
     objective reaches, then the others; and the edges of these groups, shape (limits + 2,).

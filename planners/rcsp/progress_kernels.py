@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from drivers.interface.kernel import kernel
 
 F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
@@ -12,7 +13,7 @@ F32 = NDArray[np.float32]
 _NO_LENGTH = 1e-300  # m^2; keeps the share of a segment finite where both its ends are one point
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def segments_of(path: F64) -> F64:
     """Return starts (x, y) of a path's segments, their vectors, and the inverses of their squared lengths, shape (5, m - 1)."""
     segments = np.empty((5, max(len(path) - 1, 1)))
@@ -23,7 +24,7 @@ def segments_of(path: F64) -> F64:
     return segments
 
 
-@njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "arcp", "nsz"})  # type: ignore[untyped-decorator]
+@kernel(fast=True)
 def nearest_on(segments: F64, x: float, y: float, apart: F64) -> tuple[int, float, float]:
     """Return the segment that is nearest to a point, where on it that is, as a share of it, and the squared distance.
 
@@ -48,7 +49,7 @@ def nearest_on(segments: F64, x: float, y: float, apart: F64) -> tuple[int, floa
     return nearest, min(max(t, 0.0), 1.0), apart[nearest]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def to_go(x: F32, y: F32, yaw: F32, path: F64, along: F64, lateral: float, heading: float, look_ahead_m: float) -> F64:
     """Return the way that is left from each pose, shape (n,) [m]: along the route from the nearest point of it, plus what
     lying beside it and facing away from where it leads cost.
@@ -78,7 +79,7 @@ def to_go(x: F32, y: F32, yaw: F32, path: F64, along: F64, lateral: float, headi
     return left
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def way_made(
     pose: F64, x: F32, y: F32, yaw: F32, looks: NDArray[np.int64], path: F64, along: F64, lateral: float, heading: float,
     look_ahead_m: float,

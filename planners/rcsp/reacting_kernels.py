@@ -6,9 +6,9 @@ Source: Han, Zhu, RCSP, section 4.1; that the reaction may be to each candidate 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from planners.prediction.kernels import Draws, advance
 from planners.rcsp.clearance_kernels import lower_clearance, nearest_squared
 
@@ -16,7 +16,7 @@ F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def reacting_clearances(x: F32, y: F32, draws: Draws, steps_s: F64, far_m: float) -> F32:
     """Return the least clearance of each command in each scenario over the horizon, shape (commands, scenarios)."""
     obstacles, _, n = draws.position.shape

@@ -8,9 +8,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from planners.risk import count_within, gather_smallest
 
 F64 = NDArray[np.float64]
@@ -28,7 +28,7 @@ class Risk(NamedTuple):
     depth_m: float
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def risk_of(clearance_m: float, safe_m: float, risk: Risk) -> float:
     """Return g_risk, in [0, `largest(risk)`]: zero from safe_m on.
 
@@ -54,7 +54,7 @@ def largest(risk: Risk, safe_m: float) -> float:
     return float(risk_of(-np.inf, safe_m, risk))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def tails(
     clearance: F32, static_m: F32, brakable: NDArray[np.bool_], count: int, risk: Risk, static_safe_m: float
 ) -> tuple[F64, F64, NDArray[np.bool_]]:
@@ -93,7 +93,7 @@ def tails(
     return tail, room, free
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def risks_of(clearance: F32, safe_m: float, risk: Risk, risks: F64) -> None:
     """Write `risk_of` clearances, shape (n,), into risks, shape (n,).
 
@@ -113,7 +113,7 @@ def risks_of(clearance: F32, safe_m: float, risk: Risk, risks: F64) -> None:
         risks[i] = near if c < safe_m else 0.0
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def mean_risks(clearance: F32, static_m: F32, brakable: NDArray[np.bool_], risk: Risk, static_safe_m: float) -> F64:
     """Return the mean risk of every command over the scenarios, shape (commands,); the arguments are those of `tails`.
 

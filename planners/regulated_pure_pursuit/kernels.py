@@ -6,16 +6,16 @@ Source: Macenski, Singh, Martin, Gines, Regulated Pure Pursuit for Robot Path Tr
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from estimators.field_query import bilinear
 
 F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def carrot_on(path: F64, x: float, y: float, distance_m: float) -> tuple[float, float]:
     """Return where the path, shape (n, 2), first leaves the circle of this radius around (x, y); its end when it never does."""
     for i in range(len(path) - 1):
@@ -32,14 +32,14 @@ def carrot_on(path: F64, x: float, y: float, distance_m: float) -> tuple[float, 
     return path[-1, 0], path[-1, 1]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def curvature_to(ahead_m: float, left_m: float) -> float:
     """Return the curvature [1/m] of the circle that leaves the robot forwards and meets a point in its frame (equation 2)."""
     squared = ahead_m * ahead_m + left_m * left_m
     return 2.0 * left_m / squared if squared > 0.001 else 0.0
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def regulated(
     speed: float, curvature: float, clearance_m: float, radius_min_m: float, scaling_m: float, gain: float, slowest: float
 ) -> float:
@@ -52,7 +52,7 @@ def regulated(
     return max(min(in_curve, near), min(slowest, speed))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def approaching(speed: float, left_m: float, distance_m: float, scaling_m: float, slowest: float) -> float:
     """Return the speed towards the end of a path of which `left_m` is left, `distance_m` away (section 4.2)."""
     if left_m >= scaling_m:
@@ -60,7 +60,7 @@ def approaching(speed: float, left_m: float, distance_m: float, scaling_m: float
     return min(speed, max(speed * distance_m / scaling_m, slowest))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def collides_along(
     pose: F64, speed: float, turn: float, reach_m: float, time_s: float, required_m: float,
     clearance: F32, corner_x: float, corner_y: float, cell_m: float,

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from drivers.interface.kernel import kernel
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
 Bool = NDArray[np.bool_]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def segment_cost(cost: F64, x0: float, y0: float, x1: float, y1: float) -> float:
     """Return the integral of the cost, shape (rows, columns), along a segment in cells (cell (0, 0) has its centre at 0, 0)."""
     length = np.hypot(x1 - x0, y1 - y0)
@@ -25,7 +26,7 @@ def segment_cost(cost: F64, x0: float, y0: float, x1: float, y1: float) -> float
     return float(total * length / pieces)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def pull_straight(path: F64, cost: F64) -> F64:
     """Return the path from cell to cell, (n, 2) as x, y, with every detour replaced by a segment that costs no more, (m, 2).
 
@@ -52,7 +53,7 @@ def pull_straight(path: F64, cost: F64) -> F64:
     return path[kept[:count]]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def near_cells(path_rows: I64, path_columns: I64, reach: int, rows: int, columns: int) -> Bool:
     """Return which cells lie within `reach` cells, up or across, of a cell of the path, (n,) each; shape (rows, columns)."""
     near = np.zeros((rows, columns), np.bool_)

@@ -11,8 +11,9 @@ Davidson et al., Work-efficient parallel GPU methods for single-source shortest 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from drivers.interface.kernel import kernel
 
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
@@ -20,13 +21,13 @@ I32 = NDArray[np.int32]
 _AHEAD = 1.5  # how far the limit moves on, in cells of cost 1: measured, of 0.5 to 3
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _half_lengths(cell_m: float) -> tuple[float, float]:
     """Return half the length [m] of a step along an axis and along a diagonal."""
     return 0.5 * cell_m, 0.5 * (cell_m * np.sqrt(2.0))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def cheapest(cost: F64, start: tuple[int, int], cell_m: float) -> F64:
     """Return what the cheapest way from `start` (row, column) to every cell costs, shape (rows, columns); inf: there is none.
 
@@ -75,7 +76,7 @@ def cheapest(cost: F64, start: tuple[int, int], cell_m: float) -> F64:
     return reached[1:-1, 1:-1].copy()
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def way_to(target: tuple[int, int], reached: F64, cost: F64, cell_m: float) -> I32:
     """Return the cells (row, column) of the cheapest way to a cell that is reached, the start first, shape (n, 2).
 

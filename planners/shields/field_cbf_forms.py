@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from drivers.interface.kernel import kernel
 from estimators.belief import F32, Belief, Mask
 from planners.shields.field_cbf_kernels import F64, Barrier, boundary_samples, filter_velocity, own_gradient
 
@@ -69,7 +69,7 @@ def objects(belief: Belief, asked: Asked, barrier: Barrier) -> Answer:
 FORMS: dict[str, Form] = {"boundaries": boundaries, "single_scalar": single_scalar, "objects": objects}
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _by_boundaries(
     field: F32, rate: F32, overlap: Mask, corner: F64, cell_m: float, pose: F64, asked: F64, low: F64, high: F64,
     barrier: Barrier,
@@ -84,7 +84,7 @@ def _by_boundaries(
     return answer
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _by_own_gradient(
     field: F32, rate: F32, overlap: Mask, corner: F64, cell_m: float, pose: F64, asked: F64, low: F64, high: F64,
     barrier: Barrier,

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from planners.shields.plane_qp import solve
 
 F64 = NDArray[np.float64]
@@ -38,7 +38,7 @@ class Barrier(NamedTuple):
     gate: int
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def boundary_of(field: F32, row: int, column: int, cell_m: float, x: float, y: float) -> tuple[float, float, float, float]:
     """Project a cell onto its nearest boundary and look at it from the robot.
 
@@ -71,7 +71,7 @@ def boundary_of(field: F32, row: int, column: int, cell_m: float, x: float, y: f
     return away_x, away_y, distance, slope
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def direction_bin(x: float, y: float, bins: int) -> int:
     """Return in which of `bins` directions a vector points, counted on a diamond instead of a circle: no arc tangent."""
     along = x / (abs(x) + abs(y))
@@ -79,7 +79,7 @@ def direction_bin(x: float, y: float, bins: int) -> int:
     return int(turn * 0.25 * bins) % bins
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def boundary_samples(
     field: F32, rate: F32, overlap: Mask, corner: F64, cell_m: float, robot: F64, radius_m: float, reach_m: float, bins: int
 ) -> tuple[F64, F64, F64, bool]:
@@ -140,7 +140,7 @@ def boundary_samples(
     return normal, distance, total / np.maximum(count, 1.0), enclosed
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def own_gradient(field: F32, rate: F32, overlap: Mask, corner: F64, cell_m: float, robot: F64) -> tuple[F64, F64, F64, bool]:
     """Return what a single-scalar barrier h = Gamma(x) - Gamma_safe reads at the robot, in the form of `boundary_samples`.
 
@@ -169,7 +169,7 @@ def own_gradient(field: F32, rate: F32, overlap: Mask, corner: F64, cell_m: floa
     return normal, distance, recede, field[row, column] <= 0.0
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def constraints(normal: F64, distance: F64, rate: F64, asked: F64, barrier: Barrier) -> tuple[F64, F64, I64]:
     """Return the half-planes normal . u >= bound that are committed to the QP, (m, 2) and (m,) [m/s], and of which samples, (m,).
 
@@ -202,7 +202,7 @@ def constraints(normal: F64, distance: F64, rate: F64, asked: F64, barrier: Barr
     return normal[kept[:count]], bound[:count], kept[:count]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def filter_velocity(
     normal: F64, distance: F64, rate: F64, enclosed: bool, pose: F64, asked: F64, low: F64, high: F64, barrier: Barrier
 ) -> tuple[float, float, F64, F64, float, float, bool]:

@@ -9,8 +9,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from drivers.interface.kernel import kernel
 
 F64 = NDArray[np.float64]
 
@@ -39,14 +40,14 @@ def times_of(answer: Answer) -> tuple[F64, NDArray[np.int64]]:
     return times_s, np.concatenate((np.arange(till), np.arange(till + parts - 1, len(times_s), parts)))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def approached(value: float, sent: float, target: float, most: float, share: float) -> tuple[float, float]:
     """Return a velocity and what is sent for it after a step: that changes by `most` towards the target, and is followed."""
     change = min(max(target - sent, -most), most)
     return value + (sent + 0.5 * change - value) * share, sent + change
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def shares(answer: Answer) -> tuple[float, float, float]:
     """Return how much of what is lacking is made up for in the latency, a step, and a step afterwards."""
     if answer.response_s <= 0.0:
@@ -57,7 +58,7 @@ def shares(answer: Answer) -> tuple[float, float, float]:
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def turned(
     course: F64, first: int, last: int, dt: float, state: tuple[float, float, float], target: float, most: float, share: float
 ) -> tuple[float, float, float]:
@@ -71,7 +72,7 @@ def turned(
     return angle, turn, sent
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def courses(yaw: float, now: float, sent: float, turns: F64, answer: Answer) -> tuple[F64, F64, NDArray[np.int64]]:
     """Return cosine and sine of the heading of each turn kept up, and of one that ends after the steps, and their rows.
 

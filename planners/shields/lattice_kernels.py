@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from estimators.field_query import bilinear
 from planners.shields.lattice_answer_kernels import Answer, approached, courses, shares
 
@@ -37,14 +37,14 @@ class Local(NamedTuple):
     far_m: float  # clearance beyond which more is worth nothing
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def static_at(local: Local, x: float, y: float) -> float:
     """Return the clearance to what stands still at a place, surface to surface [m]; negative where they overlap."""
     c: float = bilinear(local.clearance, local.corner_x, local.corner_y, local.cell_m, x, y) - local.radius_m
     return c
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def past_movers(local: Local, x: float, y: float, look: int, least: float) -> float:
     """Return the clearance to who moves at a place and look, or `least` where that is less [m]; no root is taken for the far."""
     where = local.where[look]
@@ -56,7 +56,7 @@ def past_movers(local: Local, x: float, y: float, look: int, least: float) -> fl
     return least
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def driven(
     local: Local, course: F64, first: int, last: int, dt: float, state: State, target_x: float, target_y: float,
     most_x: float, most_y: float, share: float,
@@ -80,7 +80,7 @@ def driven(
     return least, (x, y, vx, vy, sent_x, sent_y, free)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def forecast(pose: F64, now: F64, sent: F64, twists: F64, answer: Answer, local: Local) -> tuple[F64, F64, float]:
     """Drive every twist from the present motion; return least clearance, shape (n,), where the steps end, (n, 2), and that now.
 

@@ -8,15 +8,16 @@ tune, and a box without width (a base that cannot strafe) is a polygon like any 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from drivers.interface.kernel import kernel
 
 F64 = NDArray[np.float64]
 
 SLACK_RESOLUTION = 1e-6  # m/s
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def cut(polygon: F64, normal: F64, bound: float) -> F64:
     """Return the part of a convex polygon, corners in order, shape (n, 2), with normal . u >= bound, shape (m, 2); m may be 0."""
     n = len(polygon)
@@ -38,7 +39,7 @@ def cut(polygon: F64, normal: F64, bound: float) -> F64:
     return kept[:count]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def feasible_polygon(normals: F64, bounds: F64, slack: float, low: F64, high: F64) -> F64:
     """Return the corners, shape (m, 2), of the box cut by normals . u >= bounds - slack; empty when nothing is left."""
     polygon = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
@@ -49,7 +50,7 @@ def feasible_polygon(normals: F64, bounds: F64, slack: float, low: F64, high: F6
     return polygon
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def worst_violation(normals: F64, bounds: F64, u: F64) -> float:
     """Return by how much the worst of normals . u >= bounds fails at u; negative when all hold, -inf when there is none."""
     worst = -np.inf
@@ -58,7 +59,7 @@ def worst_violation(normals: F64, bounds: F64, u: F64) -> float:
     return worst
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def nearest_in_polygon(polygon: F64, u: F64) -> F64:
     """Return the point of the polygon's edges, corners in order, shape (n, 2) with n > 0, that is nearest to u, shape (2,)."""
     best = np.inf
@@ -77,7 +78,7 @@ def nearest_in_polygon(polygon: F64, u: F64) -> F64:
     return nearest
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def solve(normals: F64, bounds: F64, asked: F64, low: F64, high: F64) -> tuple[F64, float]:
     """Minimise |u - asked|^2 subject to low <= u <= high and normals . u >= bounds.
 

@@ -7,14 +7,14 @@ robots, ROBOTIK 2012; the same, Efficient trajectory optimization using a sparse
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from drivers.interface.kernel import kernel
 from estimators.field_query import bilinear_gradient
 from planners.teb.graph_kernels import BANDWIDTH, F64, Bounds, Ends, Indices, Normal, Scene, Weights, add_at_pose
 from planners.teb.motion_kernels import add_acceleration, add_motion, segments_of
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def add_standing(normal: Normal, poses: F64, scene: Scene, bounds: Bounds, weights: Weights) -> float:
     """Add the gaps of every free pose to what stands; return their cost."""
     cost, least = 0.0, bounds.least_gap_m + bounds.epsilon
@@ -28,7 +28,7 @@ def add_standing(normal: Normal, poses: F64, scene: Scene, bounds: Bounds, weigh
     return cost
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def add_moving(normal: Normal, poses: F64, passed_s: F64, scene: Scene, bounds: Bounds, weights: Weights) -> float:
     """Add the gaps of every free pose to what moves, where it is when the robot passes; return their cost."""
     cost, least = 0.0, bounds.least_gap_m + bounds.epsilon
@@ -44,7 +44,7 @@ def add_moving(normal: Normal, poses: F64, passed_s: F64, scene: Scene, bounds: 
     return cost
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def add_via(normal: Normal, poses: F64, nearest: Indices, scene: Scene, weights: Weights) -> float:
     """Add the distances of the points to pass by to their poses, by index, shape (k,); return their cost."""
     cost = 0.0
@@ -56,7 +56,7 @@ def add_via(normal: Normal, poses: F64, nearest: Indices, scene: Scene, weights:
     return cost
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def nearest_poses(poses: F64, points: F64) -> Indices:
     """Return the free pose nearest to each point, shape (k,); 0, which is fixed, in a band that has none."""
     nearest = np.zeros(len(points), np.int64)
@@ -69,7 +69,7 @@ def nearest_poses(poses: F64, points: F64) -> Indices:
     return nearest
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def evaluated(
     poses: F64, times: F64, passed_s: F64, nearest: Indices, scene: Scene, bounds: Bounds, weights: Weights, ends: Ends,
     derive: bool,

@@ -12,8 +12,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from drivers.interface.kernel import kernel
 
 F64 = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -81,7 +82,7 @@ class Normal(NamedTuple):
     gradient: F64  # (unknowns,), of half the cost
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def beyond(value: float, low: float, high: float) -> tuple[float, float]:
     """Return by how much a value is outside of an interval, and the derivative of that."""
     if value > high:
@@ -91,7 +92,7 @@ def beyond(value: float, low: float, high: float) -> tuple[float, float]:
     return 0.0, 0.0
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def add(normal: Normal, unknowns: Indices, slope: F64, sign: float, residual: float, weight: float) -> float:
     """Add a penalty, with `sign` times its derivatives by some unknowns, shapes (k,), to the equations; return its cost."""
     if residual == 0.0 or weight == 0.0:
@@ -108,7 +109,7 @@ def add(normal: Normal, unknowns: Indices, slope: F64, sign: float, residual: fl
     return weight * residual * residual
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def add_at_pose(normal: Normal, i: int, slope_x: float, slope_y: float, residual: float, weight: float) -> float:
     """Add a penalty of where pose i is, with its derivatives by x and y; return its cost."""
     if residual == 0.0 or weight == 0.0:

@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from drivers.interface.kernel import kernel
 from planners.teb.graph_kernels import F64, Bounds, Ends, Indices, Normal, Weights, add, beyond
 
 
@@ -26,13 +26,13 @@ class Segments(NamedTuple):
     unknowns: Indices  # (n - 1, 7); below 0: fixed
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def wrapped(angle: float) -> float:
     """Return the same angle between -pi and pi."""
     return (angle + np.pi) % (2.0 * np.pi) - np.pi
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def segments_of(poses: F64, times: F64) -> Segments:
     """Return every segment of a band."""
     n = len(times)
@@ -63,7 +63,7 @@ def segments_of(poses: F64, times: F64) -> Segments:
     return Segments(forward, sideways, forward_slope, sideways_slope, twist, twist_slope, unknowns)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def add_motion(normal: Normal, seg: Segments, times: F64, bounds: Bounds, weights: Weights) -> float:
     """Add time, kinematics and velocities of every segment; return their cost."""
     cost, by_time, eps = 0.0, np.zeros(7), bounds.epsilon
@@ -81,7 +81,7 @@ def add_motion(normal: Normal, seg: Segments, times: F64, bounds: Bounds, weight
     return cost
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def add_acceleration(
     normal: Normal, seg: Segments, times: F64, ends: Ends, axis: int, limit: float, weight: float
 ) -> float:  # fmt: skip
@@ -107,7 +107,7 @@ def add_acceleration(
     return float(cost)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _add_end(
     normal: Normal, seg: Segments, times: F64, i: int, axis: int, other: float, limit: float, weight: float
 ) -> float:  # fmt: skip

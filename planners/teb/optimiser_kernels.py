@@ -7,8 +7,8 @@ Madsen, Nielsen, Tingleff, Methods for non-linear least squares problems, 2004, 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from drivers.interface.kernel import kernel
 from planners.teb.cost_kernels import evaluated, nearest_poses
 from planners.teb.graph_kernels import BANDWIDTH, F64, Bounds, Ends, Scene, Weights
 
@@ -18,7 +18,7 @@ _SETTLED = 3e-3  # an iteration that takes off less of the cost is the last of i
 _LONGEST_STEP = 0.25  # of any unknown [m, rad, s]: beyond it the penalties are not what they look like here
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def solve_banded(matrix: F64, right: F64) -> tuple[bool, F64]:
     """Return whether a banded symmetric matrix, as in `Normal`, is positive definite, and the solution, shape (n,)."""
     n = len(right)
@@ -46,7 +46,7 @@ def solve_banded(matrix: F64, right: F64) -> tuple[bool, F64]:
     return True, x
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def stepped(poses: F64, times: F64, step: F64) -> tuple[F64, F64]:
     """Return the band with a step of the unknowns, shape (4 (n - 2) + 1,), added; the times keep a least length."""
     moved, spent = poses.copy(), times.copy()
@@ -57,7 +57,7 @@ def stepped(poses: F64, times: F64, step: F64) -> tuple[F64, F64]:
     return moved, spent
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def passing_times(times: F64) -> F64:
     """Return when each pose is passed, shape (n,), for the times between them, shape (n - 1,)."""
     passed = np.zeros(len(times) + 1)
@@ -65,7 +65,7 @@ def passing_times(times: F64) -> F64:
     return passed
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def improved(
     poses: F64, times: F64, scene: Scene, bounds: Bounds, weights: Weights, ends: Ends, iterations: int
 ) -> tuple[F64, F64, float]:  # fmt: skip
@@ -95,7 +95,7 @@ def improved(
     return poses, times, cost
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def resized(poses: F64, times: F64, wanted_s: float, play_s: float, least: int, most: int) -> tuple[F64, F64]:
     """Return the band with a pose more where the time is longer than wanted, one less where it is shorter, within a play."""
     more_poses, more_times = np.empty((2 * len(poses), 3)), np.empty(2 * len(poses))
@@ -122,7 +122,7 @@ def resized(poses: F64, times: F64, wanted_s: float, play_s: float, least: int, 
     return more_poses[: n + 1].copy(), more_times[:n].copy()
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def optimised(
     poses: F64, times: F64, scene: Scene, bounds: Bounds, weights: Weights, ends: Ends,
     wanted_s: float, play_s: float, most: int, outer: int, inner: int, growth: float,
@@ -142,7 +142,7 @@ def optimised(
     return poses, times, cost
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _with_obstacle(weights: Weights, obstacle: float) -> Weights:
     """Return the weights with another one of what stands."""
     w = weights

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from drivers.interface.kernel import kernel
 
 I64 = NDArray[np.int64]
 U8 = NDArray[np.uint8]
@@ -74,7 +75,7 @@ def _tables() -> U32:
 _TABLES = _tables()
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _crcs(data: U8, bounds: I64, tables: U32) -> U32:
     columns, ticks = bounds.shape[0], bounds.shape[1] - 2
     crcs = np.empty(ticks, np.uint32)
@@ -89,7 +90,7 @@ def _crcs(data: U8, bounds: I64, tables: U32) -> U32:
     return crcs
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _crc(crc: np.uint32, data: U8, start: int, end: int, tables: U32) -> np.uint32:
     """Go on with a CRC over the bytes from `start` to `end`."""
     low, at = np.uint32(255), start

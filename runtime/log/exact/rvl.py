@@ -11,9 +11,9 @@ import struct
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from drivers.interface.samples import frozen_array
 
 MEDIA_TYPE = "application/rvl"
@@ -82,7 +82,7 @@ def _size(code: U8) -> tuple[int, int] | None:
     return (height, width) if min(width, height) >= 0 and width * height <= _MOST_PIXELS else None
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _put(code: U8, at: int, word: int, filled: int, value: int) -> tuple[int, int, int]:
     """Append one number; eight four-bit groups make a word of 32 bits, its first group on top."""
     while True:
@@ -100,7 +100,7 @@ def _put(code: U8, at: int, word: int, filled: int, value: int) -> tuple[int, in
             return at, word, filled
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _encode(pixels: U16, code: U8) -> int:
     at, word, filled, i, last = 0, 0, 0, 0, 0
     while i < pixels.size:
@@ -124,7 +124,7 @@ def _encode(pixels: U16, code: U8) -> int:
     return at
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _decode_all(words: U32, word_ends: I64, pixels: U16, pixel_ends: I64, whole: B8) -> None:
     begins, first = 0, 0
     for k in range(whole.size):
@@ -133,7 +133,7 @@ def _decode_all(words: U32, word_ends: I64, pixels: U16, pixel_ends: I64, whole:
         begins, first = word_ends[k], pixel_ends[k]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _get(words: U32, at: int, word: np.uint32, left: int) -> tuple[np.int64, int, np.uint32, int]:
     """Read the number that begins in the `left` four-bit groups of a word, the next of which is on top, or in word `at`.
 
@@ -155,9 +155,9 @@ def _get(words: U32, at: int, word: np.uint32, left: int) -> tuple[np.int64, int
             return np.int64(-1), at, word, left
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@kernel()
 def _decode(words: U32, pixels: U16) -> bool:
-    i, at, word, left, last = 0, 0, np.uint32(0), 0, 0
+    i, at, word, left, last = np.int64(0), 0, np.uint32(0), 0, np.int64(0)
     while i < pixels.size:
         zeros, at, word, left = _get(words, at, word, left)
         others, at, word, left = _get(words, at, word, left)
