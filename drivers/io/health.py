@@ -13,6 +13,7 @@ from drivers.interface.shared_memory import Block, Seqlock
 from drivers.interface.shared_ring import SharedRing
 
 FIGURES = 32
+PLACES = 2  # of the record: one is whole while the other is written
 STATES = tuple(DeviceState)
 _TEXT = {"fault": 400, "firmware": 64, "protocol": 64, "serial": 64}  # bytes
 
@@ -69,13 +70,17 @@ DTYPE = np.dtype([_type_of(f.name, str(f.type)) for f in fields(HealthRecord)])
 
 
 class HealthBlock:
-    """A health record in shared memory, and the child's heartbeat."""
+    """A health record in shared memory, and the child's heartbeat.
+
+    There are two places, written in turn: the newest record stays whole when its writer is killed while it writes the next.
+    """
 
     def __init__(self, block: Block) -> None:
         """Take the block's place in the memory."""
         self._heartbeat = block.words(1)
-        self._lock = Seqlock(block.words(1))
-        self._record = block.array(DTYPE, 1)
+        self._published = block.words(1)  # how many records
+        self._locks = [Seqlock(block.words(1)) for _ in range(PLACES)]
+        self._records = [block.array(DTYPE, 1) for _ in range(PLACES)]
         self._seen = 0  # nothing published yet
         self._newest = HealthRecord()
 
@@ -91,15 +96,19 @@ class HealthBlock:
     def publish(self, health: HealthRecord) -> None:
         """Write the whole record."""
         row = tuple(_packed(getattr(health, name)) for name in _NAMES)
-        self._lock.begin()
-        self._record[0] = row
-        self._lock.end()
+        count = self._published[0] + 1
+        place = count % PLACES
+        self._locks[place].begin()
+        self._records[place][0] = row
+        self._locks[place].end()
+        self._published[0] = count
 
     def read(self) -> HealthRecord:
         """Return the newest whole record; the same object until there is another."""
-        version = self._lock.version
-        if version != self._seen and (rows := self._lock.read(self._record.copy)) is not None:
-            self._newest, self._seen = _unpacked(rows[0].item()), version
+        count = self._published[0]
+        place = count % PLACES
+        if count != self._seen and (rows := self._locks[place].read(self._records[place].copy)) is not None:
+            self._newest, self._seen = _unpacked(rows[0].item()), count
         return self._newest
 
 

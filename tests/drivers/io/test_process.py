@@ -168,7 +168,6 @@ def test_a_dead_process_is_replaced_and_its_counters_go_on(io, toy, blow, why, c
     opened(io, toy)
     toy.wire.send(struct.pack("<d", 1.0))
     until(lambda: io.health().received == 1)
-    time.sleep(0.1)  # until it has published
     pid = io.pid
     os.kill(pid, signal.SIGKILL) if blow == "kill" else toy.wire.send(b"bug")
     health = until(lambda: io.health().state is DeviceState.RECONNECTING and io.health())
