@@ -28,20 +28,22 @@ def encounters(sections: Sections, offsets: F64, robot: F64, speed_m_s: float, h
         robot: in odom, shape (2,).
         speed_m_s: the fastest that the robot arrives with.
         horizon_s: how far it is extrapolated.
-        closing: middle, velocity and number of cells of the boundary, shape (5,).
+        closing: middle, velocity and number of cells (0: nothing) of each that closes in, shape (k, 5).
     """
     apart = np.full((len(sections.at), len(offsets)), np.inf)
-    if closing[4] == 0.0:
-        return apart
-    speed2 = max(closing[2] * closing[2] + closing[3] * closing[3], 1e-6)
-    for i in range(len(sections.at)):
-        for j in range(len(offsets)):
-            x = sections.at[i, 0] + offsets[j] * sections.normal[i, 0]
-            y = sections.at[i, 1] + offsets[j] * sections.normal[i, 1]
-            first = min(EARLY * np.hypot(x - robot[0], y - robot[1]) / speed_m_s, horizon_s)
-            nearest = ((x - closing[0]) * closing[2] + (y - closing[1]) * closing[3]) / speed2
-            t = min(max(nearest, first), horizon_s)
-            apart[i, j] = np.hypot(x - closing[0] - closing[2] * t, y - closing[1] - closing[3] * t) - BODY_M
+    for k in range(len(closing)):
+        if closing[k, 4] == 0.0:
+            continue
+        who_x, who_y, vx, vy = closing[k, 0], closing[k, 1], closing[k, 2], closing[k, 3]
+        speed2 = max(vx * vx + vy * vy, 1e-6)
+        for i in range(len(sections.at)):
+            for j in range(len(offsets)):
+                x = sections.at[i, 0] + offsets[j] * sections.normal[i, 0]
+                y = sections.at[i, 1] + offsets[j] * sections.normal[i, 1]
+                first = min(EARLY * np.hypot(x - robot[0], y - robot[1]) / speed_m_s, horizon_s)
+                nearest = ((x - who_x) * vx + (y - who_y) * vy) / speed2
+                t = min(max(nearest, first), horizon_s)
+                apart[i, j] = min(apart[i, j], np.hypot(x - who_x - vx * t, y - who_y - vy * t) - BODY_M)
     return apart
 
 

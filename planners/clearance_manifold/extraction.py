@@ -117,10 +117,7 @@ class Solver:
     def _costs(self, scene: Scene) -> F64:
         """Return the costs of all stations ahead and offsets, shape (n, m)."""
         ahead = Sections(*(part[self._stations.own : scene.end] for part in scene.sections))
-        come = scene.closing[scene.closing[:, 4] > 0.0]
-        apart = np.full((len(ahead.at), len(self._offsets)), np.inf)
-        for who in come:
-            np.minimum(apart, encounters(ahead, self._offsets, scene.robot, scene.speed_m_s, ENCOUNTER_S, who), out=apart)
+        apart = encounters(ahead, self._offsets, scene.robot, scene.speed_m_s, ENCOUNTER_S, scene.closing)
         return np.asarray(station_costs(profiles(scene.ground, ahead, self._offsets), apart, self._offsets, self._demand))
 
     def pays(self, scene: Scene) -> float:

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.belief import F64, Mask
-from planners.clearance_manifold.branch_kernels import encounters
 from planners.clearance_manifold.closing import SLOTS
 from planners.clearance_manifold.extraction import Scene, Solver
 from planners.clearance_manifold.passing_kernels import ABREAST_M, give_way, left_to, meeting, runs_along
@@ -52,7 +51,6 @@ class Passing:
         runs_along(sections.normal[0], closing)
         left_to(1.0, sections, 0, np.zeros(2), 1.0, closing, 0.1)
         give_way(np.zeros(2), np.zeros(2), closing, 0.1, 1.0, 1.0)
-        encounters(sections, np.zeros(1), np.zeros(2), 1.0, 1.0, closing)
 
     def update(self, scene: Scene, velocity: F64, begins: Mask) -> tuple[F64, Scene]:
         """Return the hands on which what closes in passes, shape (SLOTS,), and the scene with what that leaves of it.

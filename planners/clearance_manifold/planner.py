@@ -31,7 +31,7 @@ from planners.clearance_manifold.manifold import Stations
 from planners.clearance_manifold.passing import Passing
 from planners.clearance_manifold.prediction import ArrivalField, Predicted
 from planners.clearance_manifold.properties import check
-from planners.clearance_manifold.reading import Reader
+from planners.clearance_manifold.reading import Reader, velocity_of
 from planners.clearance_manifold.ridge_kernels import Ground, Sections
 from planners.clearance_manifold.settings import ClearanceManifoldSettings
 from planners.clearance_manifold.tracker import SECOND_NS, Category, Continuation, Tracker
@@ -93,7 +93,7 @@ class ClearanceManifold:
         new_goal = self._follow_route(route, point, predicted.closing, belief.stamp_ns)
         assert self._chart is not None
         scene = self._scene(self._chart, predicted, belief, point)
-        hands, scene = self._passing.update(scene, _velocity(belief), predicted.begins)
+        hands, scene = self._passing.update(scene, velocity_of(belief), predicted.begins)
         told = self._tracker.advance(scene, belief, new_goal)
         outlook = self._outlook(scene, told, belief)
         left_m = self._chart.length_m - self._arc_m
@@ -129,7 +129,7 @@ class ClearanceManifold:
         point = self._control_point(pose)
         self._arc_m = float(self._chart.project(point[None], self._arc_m)[0, 0])
         scene = self._scene(self._chart, predicted, belief, point)
-        hands, scene = self._passing.update(scene, _velocity(belief), predicted.begins)
+        hands, scene = self._passing.update(scene, velocity_of(belief), predicted.begins)
         if not hands.any():
             return np.zeros((0, 5)), BodyTwist()
         around = Around(scene.ground, belief.clearance.known, self._solver.least_m, self._settings.controller.body_m)
@@ -229,7 +229,7 @@ class ClearanceManifold:
         way = at + np.interp(arcs_m, scene.arcs_m, told.manifold.offset_m)[:, None] * normal
         lattice = field.lattice
         seen = Seen(field.known, field.clearance_m, self._field.age_s, lattice.x_m, lattice.y_m, lattice.cell_m)
-        along_m_s = max(0.0, float(_velocity(belief) @ told.manifold.tangent()))
+        along_m_s = max(0.0, float(velocity_of(belief) @ told.manifold.tangent()))
         return self._lookout.watch(seen, way, normal, along_m_s, self._setup.period_s)
 
     def _plan(self, scene: Scene, told: Continuation, at: Situation, outlook: Outlook, command: tuple[BodyTwist, float]) -> Plan:
@@ -273,8 +273,3 @@ class ClearanceManifold:
         self._waiting.take(state)
         self._lookout.take(state)
         self._controller.take(state)
-
-
-def _velocity(belief: Belief) -> F64:
-    """Return the base's velocity, shape (2,), in odom [m/s]."""
-    return np.asarray(SE2(0.0, 0.0, belief.odom_from_base.yaw).apply(np.array([belief.twist.vx, belief.twist.vy])))

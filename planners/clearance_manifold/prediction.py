@@ -53,6 +53,7 @@ class ArrivalField:
         taken = taken_on_arrival(field, field, age_s, np.zeros(2), 1.0, np.zeros(2), self._arrival(0.0))
         lowered(field, taken, 1.0)
         nearest_closing(field, field, age_s, 0.0, np.zeros(2), 1.0, np.zeros(2), CLOSING_M_S, SLOTS)
+        self._closing.warm_up()
 
     def update(self, belief: Belief) -> Predicted:
         """Take in what is seen now and return the prediction on the belief's lattice."""

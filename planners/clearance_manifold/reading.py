@@ -9,6 +9,7 @@ import numpy as np
 from drivers.interface.geometry import SE2, wrap_angle
 from estimators.belief import F32, F64, Belief
 from estimators.field_query import sample
+from planners.clearance_manifold.closing import nearest_of
 from planners.clearance_manifold.control_kernels import known_length
 from planners.clearance_manifold.controller import UNKNOWN_GAP_M, Situation
 from planners.clearance_manifold.extraction import Scene
@@ -75,7 +76,7 @@ class Reader:
             heading_rad=heading_rad,
             feasible=manifold.valid > 1,
             robot=point,
-            velocity=SE2(0.0, 0.0, belief.odom_from_base.yaw).apply(np.array([belief.twist.vx, belief.twist.vy])),
+            velocity=velocity_of(belief),
             closing=closing,
             hands=hands,
             behind_m=0.0 if self._strafes else self._behind(belief),
@@ -98,7 +99,7 @@ class Reader:
             heading_rad=yaw,
             feasible=False,
             robot=scene.robot,
-            velocity=SE2(0.0, 0.0, yaw).apply(np.array([belief.twist.vx, belief.twist.vy])),
+            velocity=velocity_of(belief),
             closing=scene.closing,
             hands=hands,
             behind_m=0.0 if self._strafes else self._behind(belief),
@@ -132,12 +133,17 @@ class Reader:
         """Return where to look: along the manifold, but turned as far as it takes to keep in view what closes in, or may.
 
         Who closes in is not followed so far that the way ahead leaves the view.
+
+        Args:
+            along_rad: along the manifold, in odom.
+            closing: what closes in, shape (n, 5).
+            point: that is controlled, shape (2,).
+            look_at: what else is to be seen, shape (2,), if anything.
         """
         off = closing[:, :2] - point
         come = closing[(closing[:, 4] > 0.0) & ((off * closing[:, 2:4]).sum(axis=1) < 0.0)]  # who has passed is not looked after
-        comes = len(come) > 0
-        nearest = come[np.argmin(np.hypot(*(come[:, :2] - point).T)), :2] if comes else look_at
-        s, watched = self._settings, nearest
+        comes, s = len(come) > 0, self._settings
+        watched = nearest_of(come, point) if comes else look_at
         if watched is None:
             return along_rad
         turns_for_it = look_at is watched and not self._strafes  # it stands meanwhile: no degree more than it takes
@@ -172,3 +178,8 @@ class Reader:
         known_m = known_length(belief.clearance.known, corner, lattice.cell_m, ahead, s.body_m, UNKNOWN_GAP_M)
         reach_m = math.inf if manifold.whole else manifold.reach_m
         return float(min(reach_m, max(0.0, known_m - s.body_m), max(0.0, left_m)))
+
+
+def velocity_of(belief: Belief) -> F64:
+    """Return the base's velocity, shape (2,), in odom [m/s]."""
+    return np.asarray(SE2(0.0, 0.0, belief.odom_from_base.yaw).apply(np.array([belief.twist.vx, belief.twist.vy])))

@@ -11,6 +11,7 @@ from drivers.interface.geometry import SE2, wrap_angle
 from estimators.belief import F64, Belief
 from estimators.field_query import sample
 from planners.clearance_manifold.chart import STEP_M, Chart
+from planners.clearance_manifold.closing import nearest_of
 from planners.clearance_manifold.settings import WaitingSettings
 
 STILL_RAD = 0.05  # nearer than this it need not look
@@ -44,7 +45,7 @@ class Waiting:
         s, waited_s = self._settings, (belief.stamp_ns - self._since_ns) / SECOND_NS
         pose = belief.odom_from_base
         if len(come):
-            return self._turn_to(come[np.argmin(np.hypot(come[:, 0] - pose.x, come[:, 1] - pose.y)), :2], pose)
+            return self._turn_to(nearest_of(come, np.array([pose.x, pose.y])), pose)
         if waited_s > s.patience_s:
             return min(s.turn_rad_s, self._most_rad_s)
         return self._turn_to(blocked_at(chart, arc_m, reach_m, least_m, belief), pose)

@@ -94,7 +94,7 @@ def sections_at(xs):
 
 
 def apart_at(xs, closing):
-    return encounters(sections_at(xs), OFFSETS, np.zeros(2), 0.5, 3.0, np.array([*closing, 20.0]))
+    return encounters(sections_at(xs), OFFSETS, np.zeros(2), 0.5, 3.0, np.array([[*closing, 20.0]]))
 
 
 def test_a_place_that_somebody_still_comes_to_is_taken_however_late_the_robot_is():
