@@ -34,7 +34,9 @@ def drawn(scene: Scene, manifold: Manifold, tube_m: float, closing: F64, look_at
         Drawing("tube_right", at + (offset - tube_m) * normal),
         Drawing("tube_left", at + (offset + tube_m) * normal),
     ]
-    lines.extend(Drawing("closing", np.stack((who[:2], who[:2] + AHEAD_S * who[2:4]))) for who in closing[closing[:, 4] > 0.0])
+    come = closing[closing[:, 4] > 0.0]
+    ways = np.stack((come[:, :2], come[:, :2] + AHEAD_S * come[:, 2:4]), axis=1)
+    lines.extend(Drawing("closing", way) for way in ways)
     if look_at is not None:
         lines.append(Drawing("looked_at", look_at[None], connected=False))
     return tuple(lines)

@@ -91,29 +91,30 @@ def nearest_closing(
         most: n at most.
     """
     rows, columns = clearance.shape
-    found, at, free = 0, np.empty((rows * columns, 2), np.int64), np.ones(rows * columns, np.bool_)
+    left, at, away_m = 0, np.empty((rows * columns, 2), np.int64), np.empty(rows * columns)
     for row in range(1, rows - 1):
         for column in range(1, columns - 1):
             change = rate[row, column]
             if change == 0.0 or abs(change) < closing_m_s or not 0.0 < clearance[row, column] <= 5.0 * cell_m:
                 continue
-            at[found, 0], at[found, 1] = row, column
-            found += 1
+            x, y = corner[0] + (column + 0.5) * cell_m, corner[1] + (row + 0.5) * cell_m
+            at[left, 0], at[left, 1] = row, column
+            away_m[left] = np.hypot(x - robot[0], y - robot[1]) if change < 0.0 else np.inf
+            left += 1
     out, count = np.zeros((most, 5)), 0
-    while count < most:
-        near_x, near_y, nearest = 0.0, 0.0, np.inf
-        for i in range(found):
-            x, y = corner[0] + (at[i, 1] + 0.5) * cell_m, corner[1] + (at[i, 0] + 0.5) * cell_m
-            distance = np.hypot(x - robot[0], y - robot[1])
-            if free[i] and rate[at[i, 0], at[i, 1]] < 0.0 and distance < nearest:
-                nearest, near_x, near_y = distance, x, y
-        if nearest == np.inf:
+    while count < most and left > 0:
+        nearest = np.argmin(away_m[:left])
+        if away_m[nearest] == np.inf:
             break
-        out[count] = _boundary(clearance, rate, recent, window_s, corner, cell_m, at[:found], free[:found], near_x, near_y)
-        for i in range(found):
+        near_x, near_y = corner[0] + (at[nearest, 1] + 0.5) * cell_m, corner[1] + (at[nearest, 0] + 0.5) * cell_m
+        out[count] = _boundary(clearance, rate, recent, window_s, corner, cell_m, at[:left], near_x, near_y)
+        others = 0
+        for i in range(left):
             x, y = corner[0] + (at[i, 1] + 0.5) * cell_m, corner[1] + (at[i, 0] + 0.5) * cell_m
-            beside = min(np.hypot(x - near_x, y - near_y), np.hypot(x - out[count, 0], y - out[count, 1]))
-            free[i] = free[i] and beside > MOVER_M
+            if min(np.hypot(x - near_x, y - near_y), np.hypot(x - out[count, 0], y - out[count, 1])) > MOVER_M:
+                at[others, 0], at[others, 1], away_m[others] = at[i, 0], at[i, 1], away_m[i]
+                others += 1
+        left = others
         if out[count, 4] >= LEAST_CELLS:
             count += 1
     return out[:count]
@@ -128,17 +129,16 @@ def _boundary(
     corner: F64,
     cell_m: float,
     at: NDArray[np.int64],
-    free: Mask,
     near_x: float,
     near_y: float,
 ) -> F64:
-    """Return the boundary around a place, fitted to those of the cells `at`, shape (n, 2), that are free, shape (n,)."""
+    """Return the boundary around a place, fitted to those of the cells `at`, shape (n, 2), that lie beside it; shape (5,)."""
     out = np.zeros(5)
     a, b, d, e, f = 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(len(at)):
         row, column = at[i]
         x, y = corner[0] + (column + 0.5) * cell_m, corner[1] + (row + 0.5) * cell_m
-        if not free[i] or (x - near_x) ** 2 + (y - near_y) ** 2 > MOVER_M * MOVER_M:
+        if (x - near_x) ** 2 + (y - near_y) ** 2 > MOVER_M * MOVER_M:
             continue
         slope_x = (clearance[row, column + 1] - clearance[row, column - 1]) / (2.0 * cell_m)
         slope_y = (clearance[row + 1, column] - clearance[row - 1, column]) / (2.0 * cell_m)
