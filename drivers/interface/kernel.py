@@ -3,6 +3,9 @@
 numba keeps machine code per file, and takes it as fresh while that file is unchanged.  But kernels of other files are inlined
 into it, constants of other files are frozen into it, and its index holds types of other files: after a pull it would run old
 code, or fail on a module that has another name by now.  So here the name under which it is kept has a digest of all of that.
+
+Sources are found by their import statements: what a kernel uses, its types included, is imported by its own file, or by one
+that this imports, and as `from module import name`.  What was kept for other sources stays on the disk, unused.
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ def test_a_changed_kernel_is_compiled_into_its_unchanged_callers(tmp_path: Path)
 
 @pytest.mark.parametrize("package", ["estimators", "planners", "sim_drivers"])
 def test_whatever_a_kernel_uses_of_ours_is_among_its_sources(package: str) -> None:
-    """Functions and types that its module's names stand for come from files of which the digest is made."""
+    """Functions, types and modules that its module's names stand for come from files of which the digest is made."""
     for path in (ROOT / package).rglob("*.py"):
         if "interface.kernel import" not in path.read_text():
             continue
@@ -66,5 +66,6 @@ def test_whatever_a_kernel_uses_of_ours_is_among_its_sources(package: str) -> No
 def _files_used(module: ModuleType) -> set[Path]:
     used = [value.py_func if isinstance(value, Dispatcher) else value for value in vars(module).values()]
     named = [value for value in used if inspect.isfunction(value) or inspect.isclass(value)]
-    files = (Path(inspect.getfile(value)) for value in named if value.__module__ != "builtins")
+    modules = [value for value in used if inspect.ismodule(value) and getattr(value, "__file__", None)]
+    files = (Path(inspect.getfile(value)) for value in (*named, *modules) if getattr(value, "__module__", "") != "builtins")
     return {file for file in files if file.is_relative_to(ROOT) and ".venv" not in file.parts}
