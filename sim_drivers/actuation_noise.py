@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
-from drivers.interface.commands import BodyTwist
 from drivers.interface.settings import Settings
+
+F64 = NDArray[np.float64]
 
 _BLOCK = 256  # draws at a time
 
@@ -34,19 +35,16 @@ class ActuationNoise:
         self._retained = math.exp(-period_s / settings.time_s)
         self._gain = settings.fraction * math.sqrt(1.0 - self._retained**2)
         self._quiet = settings.fraction == 0.0
-        self._errors: list[float] = (
-            settings.fraction * rng.standard_normal(3)
-        ).tolist()  # of vx, vy, wz; stationary from the start
-        self._draws: Iterator[list[float]] = iter(())  # plain numbers: three are too few for an array to be worth its while
+        self._errors: F64 = settings.fraction * rng.standard_normal(3)  # of vx, vy, wz; stationary from the start
+        self._draws: F64 = np.zeros((0, 3))
+        self._row = 0  # of the draw that comes next
 
-    def spoil(self, twist: BodyTwist) -> BodyTwist:
-        """Return the twist that is really run at for one period."""
+    def spoil(self, twist: F64) -> F64:
+        """Return the twist that is really run at for one period instead of vx, vy, wz, shape (3,)."""
         if self._quiet:
             return twist
-        draw = next(self._draws, None)
-        if draw is None:
-            self._draws = iter((self._gain * self._rng.standard_normal((_BLOCK, 3))).tolist())
-            draw = next(self._draws)
-        self._errors = [self._retained * error + more for error, more in zip(self._errors, draw, strict=True)]
-        vx, vy, wz = self._errors
-        return BodyTwist((1.0 + vx) * twist.vx, (1.0 + vy) * twist.vy, (1.0 + wz) * twist.wz)
+        if self._row == len(self._draws):
+            self._draws, self._row = self._gain * self._rng.standard_normal((_BLOCK, 3)), 0
+        self._errors = self._retained * self._errors + self._draws[self._row]
+        self._row += 1
+        return (1.0 + self._errors) * twist

@@ -6,10 +6,15 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from drivers.interface.commands import BaseLimits, BodyTwist
+from drivers.interface.kernel import kernel
 from drivers.interface.settings import Settings
+
+F64 = NDArray[np.float64]
 
 
 class DriveSettings(Settings):
@@ -47,7 +52,7 @@ class DriveSettings(Settings):
 
 @dataclass(frozen=True, slots=True)
 class _Order:
-    twist: BodyTwist
+    twist: F64  # (3,): vx, vy, wz
     applies_ns: int
     expires_ns: int
 
@@ -62,26 +67,28 @@ class Drive:
     def __init__(self, settings: DriveSettings) -> None:
         """Stand still, with no order."""
         self._limits = settings.limits
+        self._up, self._down = _numbers(self._limits.acceleration), _numbers(self._limits.stop_deceleration)
         self._latency_ns = round(settings.command_latency_s * 1e9)
         self._lag_s = settings.motor_lag_s
         self._pending: deque[_Order] = deque()
         self._order: _Order | None = None
-        self._set_point = BodyTwist()
-        self._output = BodyTwist()
+        self._rest = np.zeros(3)
+        self._set_point, self._output = np.zeros(3), np.zeros(3)
         self._last_ns = 0
         self.expired = 0  # times the dead man had to act
+        _follow(self._set_point, self._output, self._rest, self._up, self._down, 0.0, 1.0)  # compiled by now
 
     def command(self, twist: BodyTwist, expires_ns: int, now_ns: int) -> None:
         """Take an order; a twist beyond the caps is cut to them, as a motor controller does."""
-        self._pending.append(_Order(_capped(twist, self._limits), now_ns + self._latency_ns, expires_ns))
+        self._pending.append(_Order(_numbers(_capped(twist, self._limits)), now_ns + self._latency_ns, expires_ns))
 
     def stop(self) -> None:
         """Forget every order, so that the base brakes from the next step on."""
         self._pending.clear()
         self._order = None
 
-    def step(self, now_ns: int) -> BodyTwist:
-        """Return the twist that the wheels are to run at from now on."""
+    def step(self, now_ns: int) -> F64:
+        """Return the twist that the wheels are to run at from now on: vx, vy, wz, shape (3,), until the next step."""
         dt_s = (now_ns - self._last_ns) * 1e-9
         self._last_ns = now_ns
         while self._pending and self._pending[0].applies_ns <= now_ns:
@@ -89,10 +96,14 @@ class Drive:
         if self._order is not None and self._order.expires_ns <= now_ns:
             self._order = None
             self.expired += 1
-        target = BodyTwist() if self._order is None else self._order.twist
-        self._set_point = _ramped(self._set_point, target, self._limits, dt_s)
-        self._output = _lagged(self._output, self._set_point, self._lag_s, dt_s)
+        target = self._rest if self._order is None else self._order.twist
+        share = 1.0 - math.exp(-dt_s / self._lag_s) if self._lag_s > 0.0 else 1.0
+        _follow(self._set_point, self._output, target, self._up, self._down, dt_s, share)
         return self._output
+
+
+def _numbers(twist: BodyTwist) -> F64:
+    return np.array((twist.vx, twist.vy, twist.wz))
 
 
 def _capped(twist: BodyTwist, limits: BaseLimits) -> BodyTwist:
@@ -105,15 +116,15 @@ def _capped(twist: BodyTwist, limits: BaseLimits) -> BodyTwist:
     )
 
 
-def _ramped(value: BodyTwist, target: BodyTwist, limits: BaseLimits, dt_s: float) -> BodyTwist:
-    up, down = limits.acceleration, limits.stop_deceleration
-    return BodyTwist(
-        _approach(value.vx, target.vx, up.vx * dt_s, down.vx * dt_s),
-        _approach(value.vy, target.vy, up.vy * dt_s, down.vy * dt_s),
-        _approach(value.wz, target.wz, up.wz * dt_s, down.wz * dt_s),
-    )
+@kernel()
+def _follow(set_point: F64, output: F64, target: F64, up: F64, down: F64, dt_s: float, share: float) -> None:
+    """Move the set point a step towards the target, and what the drives make of it a share of the way to that, each (3,)."""
+    for axis in range(3):
+        set_point[axis] = _approach(set_point[axis], target[axis], up[axis] * dt_s, down[axis] * dt_s)
+        output[axis] += share * (set_point[axis] - output[axis])
 
 
+@kernel()
 def _approach(value: float, target: float, step_up: float, step_down: float) -> float:
     """Move a step towards the target: `step_up` away from rest, `step_down` towards rest, but never through it."""
     if value == target:
@@ -122,12 +133,3 @@ def _approach(value: float, target: float, step_up: float, step_down: float) -> 
         target = 0.0
     step = step_down if abs(target) < abs(value) else step_up
     return value + min(max(target - value, -step), step)
-
-
-def _lagged(value: BodyTwist, target: BodyTwist, lag_s: float, dt_s: float) -> BodyTwist:
-    share = 1.0 - math.exp(-dt_s / lag_s) if lag_s > 0.0 else 1.0
-    return BodyTwist(
-        value.vx + share * (target.vx - value.vx),
-        value.vy + share * (target.vy - value.vy),
-        value.wz + share * (target.wz - value.wz),
-    )

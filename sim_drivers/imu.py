@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from drivers.interface.devices import DeviceSetup
+from drivers.interface.kernel import kernel
 from drivers.interface.samples import ImuSample, Stamp
 from drivers.interface.settings import Settings
 from sim_drivers.imu_noise import ImuNoise, ImuNoiseSettings
@@ -52,6 +53,7 @@ class SimImu(SimSensor[ImuSample]):
         self._settings = settings
         super().__init__(setup, settings.rate_hz, settings.latency_s, settings.loss_probability, settings.buffered_samples)
         self._site_id = 0
+        self._map_from_base, self._gravity_m_s2 = np.zeros(9), np.zeros(3)  # the former the compiled world's own
         self._velocity = np.zeros(6)  # of the site: angular, linear, along the map's axes
         self._acceleration = np.zeros(3)
         self._acted_ns = -1
@@ -68,6 +70,8 @@ class SimImu(SimSensor[ImuSample]):
     def bind(self, world: MujocoWorld) -> None:
         """Find the site."""
         self._site_id = world.model.site(f"{self._setup.name}_imu").id
+        self._map_from_base, self._gravity_m_s2 = world.data.site_xmat[self._site_id], world.model.opt.gravity.copy()
+        _felt(self._map_from_base, self._velocity, self._acceleration, self._gravity_m_s2)
 
     def act(self, world: MujocoWorld) -> None:
         """Follow the velocity, also while closed, so that the first sample after opening is right."""
@@ -79,12 +83,28 @@ class SimImu(SimSensor[ImuSample]):
         super().act(world)
 
     def _measure(self, world: MujocoWorld, stamp: Stamp) -> ImuSample:
-        base_from_map = world.data.site_xmat[self._site_id].reshape(3, 3).T
-        force = base_from_map @ (self._acceleration - world.model.opt.gravity)
-        truth = np.concatenate((base_from_map @ self._velocity[:3], force))
+        truth = _felt(self._map_from_base, self._velocity, self._acceleration, self._gravity_m_s2)
         gx, gy, gz, ax, ay, az = self._noise.spoil(truth, stamp.sequence).tolist()
         return ImuSample(stamp, (gx, gy, gz), (ax, ay, az))
 
     def _reset(self) -> None:
         super()._reset()
         self._noise = ImuNoise(self._settings.noise, self._settings.rate_hz, self._setup.seed, self._setup.name)
+
+
+@kernel()
+def _felt(map_from_base: F64, velocity: F64, acceleration: F64, gravity: F64) -> F64:
+    """Return rates [rad/s] and specific force [m/s^2] along the base's axes, shape (6,).
+
+    Args:
+        map_from_base: rotation, row by row, shape (9,).
+        velocity: angular and linear, along the map's axes, shape (6,).
+        acceleration: along the map's axes, shape (3,) [m/s^2].
+        gravity: the same, shape (3,) [m/s^2].
+    """
+    felt = np.zeros(6)
+    for axis in range(3):
+        for k in range(3):
+            felt[axis] += map_from_base[3 * k + axis] * velocity[k]
+            felt[3 + axis] += map_from_base[3 * k + axis] * (acceleration[k] - gravity[k])
+    return felt

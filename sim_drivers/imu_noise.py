@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from drivers.interface.kernel import kernel
 from drivers.interface.seeds import stream
 from drivers.interface.settings import Settings
 
@@ -56,6 +57,7 @@ class ImuNoise:
         switch_on = stream(seed, f"{consumer}.bias").standard_normal(6)
         self._bias = _three_each(s.gyro_bias_rad_s, s.accel_bias_m_s2) * switch_on  # (6,)
         self._error: F64 = np.empty((0, 6))  # of the samples of one block
+        _counted(np.zeros(6), np.zeros(6), self._range, self._resolution)  # compiled by now
 
     def spoil(self, truth: F64, sequence: int) -> F64:
         """Return what is measured instead of true rates [rad/s] and specific force [m/s^2], both in one array (6,)."""
@@ -64,8 +66,17 @@ class ImuNoise:
             white, steps = stream(self._seed, self._consumer, block).standard_normal((2, self._block, 6))
             bias = self._bias + np.cumsum(self._walk * steps, axis=0)
             self._bias, self._error = bias[-1], bias + self._white * white
-        measured = np.minimum(np.maximum(truth + self._error[row], -self._range), self._range)
-        return np.asarray(np.rint(measured / self._resolution) * self._resolution, dtype=np.float64)
+        spoilt: F64 = _counted(truth, self._error[row], self._range, self._resolution)
+        return spoilt
+
+
+@kernel()
+def _counted(truth: F64, error: F64, most: F64, count: F64) -> F64:
+    """Return truth and error, saturated, in whole counts, each of shape (n,)."""
+    counted = np.empty_like(truth)
+    for i in range(len(truth)):
+        counted[i] = np.rint(min(max(truth[i] + error[i], -most[i]), most[i]) / count[i]) * count[i]
+    return counted
 
 
 def _three_each(gyro: float, accel: float) -> F64:

@@ -44,7 +44,7 @@ class RollerOmniChassis:
         self._torque_limit_nm = torque_limit_nm
         self._radius_m, self._height_m = size_m
         self._qpos: list[int] = []
-        self._ctrl = slice(0, 0)
+        self._ctrl = np.zeros(0)  # the compiled world's own
 
     def build(self, spec: Any, base: Any) -> None:
         """Add the body, the wheels and their drives."""
@@ -71,11 +71,11 @@ class RollerOmniChassis:
         """Find wheels and drives."""
         self._qpos = [int(world.model.joint(name).qposadr[0]) for name in WHEELS]
         first = int(world.model.actuator(WHEELS[0]).id)
-        self._ctrl = slice(first, first + 3)
+        self._ctrl = world.data.ctrl[first : first + 3]
 
     def drive(self, world: MujocoWorld, wheel_rates: NDArray[np.float64]) -> None:
         """Run the wheels at these rates [rad/s], shape (3,), as far as torque and grip allow."""
-        world.data.ctrl[self._ctrl] = wheel_rates
+        self._ctrl[:] = wheel_rates
 
     def wheel_angles(self, world: MujocoWorld) -> NDArray[np.float64]:
         """Return how far the wheels have turned [rad], shape (3,)."""

@@ -43,6 +43,7 @@ class RobotClearance:
     def __init__(self, model: Any, robot: str = "base") -> None:
         """Find the pairs in a compiled `mujoco.MjModel`."""
         self._model = model
+        self._radius, self._box = model.geom_rbound, model.geom_aabb
         own = subtree_geoms(model, robot)
         obstacles = np.flatnonzero(~own & (model.geom_contype & OBSTACLE_BIT != 0)).tolist()
         pairs = [(r, o) for r in np.flatnonzero(own).tolist() for o in obstacles if _collide(model, r, o)]
@@ -52,10 +53,10 @@ class RobotClearance:
         """Return the least distance [m] (negative: as deep as it penetrates; inf: no obstacles) and what is touched, by name."""
         model, pairs = self._model, self._pairs
         bounds = np.empty(len(pairs))
-        _lower_bounds(pairs, data.geom_xpos, data.geom_xmat, model.geom_rbound, model.geom_aabb, bounds)
+        _lower_bounds(pairs, data.geom_xpos, data.geom_xmat, self._radius, self._box, bounds)
         least, touched = np.inf, []
         while len(bounds):
-            nearest = int(np.argmin(bounds))
+            nearest = int(bounds.argmin())
             if bounds[nearest] > max(least, 0.0):  # the rest is farther than what was found, and touches nothing
                 break
             bounds[nearest] = np.inf

@@ -75,7 +75,7 @@ class SkidSteerChassis:
         self._settings = settings
         self.tyres = Tyres(WHEELS, settings.friction)  # a part of its own: they hold at every step, whoever drives the wheels
         self._qpos: list[int] = []
-        self._ctrl = slice(0, 0)
+        self._ctrl = np.zeros(0)  # the compiled world's own
 
     def build(self, spec: Any, base: Any) -> None:
         """Add the body, the wheels and their drives."""
@@ -102,11 +102,11 @@ class SkidSteerChassis:
         """Find wheels and drives."""
         self._qpos = [int(world.model.joint(name).qposadr[0]) for name in WHEELS]
         first = int(world.model.actuator(WHEELS[0]).id)
-        self._ctrl = slice(first, first + len(WHEELS))
+        self._ctrl = world.data.ctrl[first : first + len(WHEELS)]
 
     def drive(self, world: MujocoWorld, wheel_rates: NDArray[np.float64]) -> None:
         """Run the wheels at these rates [rad/s], shape (4,), as far as torque and grip allow."""
-        world.data.ctrl[self._ctrl] = wheel_rates
+        self._ctrl[:] = wheel_rates
 
     def wheel_angles(self, world: MujocoWorld) -> NDArray[np.float64]:
         """Return how far the wheels have turned [rad], shape (4,)."""

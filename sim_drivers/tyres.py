@@ -34,7 +34,8 @@ class Tyres:
         """Take the names of the wheels' bodies, which stand in the model before `build`."""
         self._wheels, self._friction = tuple(wheels), friction
         self._bodies, self._loads = np.zeros(0, np.int64), np.zeros(0, np.int64)
-        self._root = 0
+        nothing = np.zeros(0)  # what follows are the compiled world's own arrays
+        self._sensed, self._centre, self._motion, self._place, self._applied = nothing, nothing, nothing, nothing, nothing
 
     def build(self, spec: Any, base: Any) -> None:
         """Let MuJoCo tell each wheel's load.  The sensor's place is larger than the wheel: all its contacts count."""
@@ -51,13 +52,14 @@ class Tyres:
         model = world.model
         self._bodies = np.array([model.body(name).id for name in self._wheels], np.int64)
         self._loads = np.array([model.sensor(f"{name}_load").adr[0] for name in self._wheels], np.int64)
-        self._root = int(model.body_rootid[self._bodies[0]])
+        data, root = world.data, int(model.body_rootid[self._bodies[0]])
+        self._sensed, self._centre = data.sensordata, data.subtree_com[root]
+        self._motion, self._place, self._applied = data.cvel, data.xpos, data.xfrc_applied
 
     def act(self, world: MujocoWorld) -> None:
         """Hold for the next step as the velocities now, and the loads of the step before, have it."""
-        data = world.data
-        load_n, centre = data.sensordata[self._loads], data.subtree_com[self._root]
-        hold(self._bodies, data.cvel, centre, data.xpos, load_n, self._friction, data.xfrc_applied)
+        load_n = self._sensed[self._loads]
+        hold(self._bodies, self._motion, self._centre, self._place, load_n, self._friction, self._applied)
 
 
 @kernel()

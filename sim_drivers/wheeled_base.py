@@ -139,8 +139,7 @@ class WheeledBase:
 
     def act(self, world: MujocoWorld) -> None:
         """Move the set point on, and measure the wheels when it is time."""
-        twist = self._noise.spoil(self._drive.step(world.now_ns))
-        self._chassis.drive(world, self._rates_from_twist @ (twist.vx, twist.vy, twist.wz))
+        self._chassis.drive(world, self._rates_from_twist.dot(self._noise.spoil(self._drive.step(world.now_ns))))
         if self._state is DeviceState.OPEN and self._encoders.due(world.now_ns):
             self._encoders.measure(world.now_ns, self._chassis.wheel_angles(world))
 

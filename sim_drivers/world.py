@@ -64,12 +64,14 @@ class MujocoWorld:
         self._settings = settings
         self._parts: list[Part] = []
         self._next_ns: list[int] = []
+        self._periods_ns: list[int] = []
         self._due_ns = 0
         self._now_ns = 0
         self._step_ns = 0
         self._begun_ns: int | None = 0
         self._mover_frames, self._mover_spans = pack_movers((), ())
         self._belts: list[tuple[int, int, float]] = []
+        self._mocap_pos, self._mocap_quat = np.zeros((0, 3)), np.zeros((0, 4))  # of the compiled world's data
         self._model: Any = None
         self._data: Any = None
 
@@ -149,10 +151,12 @@ class MujocoWorld:
             TrundleError: MuJoCo warns that the physics went wrong.
         """
         model, data = self.model, self._data
+        moves = bool(len(self._mover_spans) or self._belts)
         while self._now_ns + self._step_ns <= time_ns:
             mujoco.mj_step2(model, data)
             self._now_ns += self._step_ns
-            self._place_movers()
+            if moves:
+                self._place_movers()
             mujoco.mj_step1(model, data)
             if self._now_ns >= self._due_ns:
                 self._act()
@@ -169,6 +173,7 @@ class MujocoWorld:
 
     def _bind(self) -> None:
         model, data = self._model, self._data
+        self._mocap_pos, self._mocap_quat = data.mocap_pos, data.mocap_quat
         mocap_ids = [int(model.body_mocapid[model.body(m.name).id]) for m in self.scene.movers]
         self._mover_frames, self._mover_spans = pack_movers(self.scene.movers, mocap_ids)
         self._belts = []
@@ -179,19 +184,20 @@ class MujocoWorld:
         mujoco.mj_step1(model, data)
         for part in self._parts:
             part.bind(self)
-        self._next_ns = [0] * len(self._parts)
+        self._next_ns, self._periods_ns = [0] * len(self._parts), [part.period_ns for part in self._parts]
         self._act()
 
     def _act(self) -> None:
+        now_ns, next_ns = self._now_ns, self._next_ns
         for index, part in enumerate(self._parts):
-            if self._next_ns[index] <= self._now_ns:
+            if next_ns[index] <= now_ns:
                 part.act(self)
-                self._next_ns[index] += part.period_ns
-        self._due_ns = min(self._next_ns, default=1 << 62)
+                next_ns[index] += self._periods_ns[index]
+        self._due_ns = min(next_ns, default=1 << 62)
 
     def _place_movers(self) -> None:
         data, time_s, held = self._data, self.scene_ns / SECOND_NS, self._begun_ns is None
-        place_movers(time_s, self._mover_frames, self._mover_spans, data.mocap_pos, data.mocap_quat)
+        place_movers(time_s, self._mover_frames, self._mover_spans, self._mocap_pos, self._mocap_quat)
         for position, velocity, speed_m_s in self._belts:
             # A belt that moves on and is put back every step: contact friction sees its velocity, its place stays.
             data.qpos[position], data.qvel[velocity] = 0.0, 0.0 if held else speed_m_s

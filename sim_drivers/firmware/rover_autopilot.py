@@ -221,7 +221,8 @@ class RoverAutopilot:
             self._drive.command(twist, world.now_ns + FOREVER_NS, world.now_ns)
         else:
             self._drive.stop()
-        self._chassis.drive(world, self._kinematics.wheel_rates(self._drive.step(world.now_ns)))
+        vx, vy, wz = self._drive.step(world.now_ns).tolist()
+        self._chassis.drive(world, self._kinematics.wheel_rates(BodyTwist(vx, vy, wz)))
 
     def _hear(self, now_ns: int, scene_ns: int, measured: Measured) -> None:
         self._scene_ns = scene_ns
