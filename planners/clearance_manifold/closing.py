@@ -14,9 +14,7 @@ from numpy.typing import NDArray
 
 from drivers.interface.samples import frozen_array
 from estimators.belief import F32, F64, ClearanceField, Mask
-from planners.clearance_manifold.boundary_kernels import FOUND
-from planners.clearance_manifold.closing_kernels import remember
-from planners.clearance_manifold.motion_kernels import SEEN_S, WIDTH
+from planners.clearance_manifold.closing_kernels import SEEN_S, WIDTH, remember
 
 SLOTS = 3  # so many are kept in mind
 
@@ -32,18 +30,18 @@ class ClosingMemory:
     def warm_up(self) -> None:
         """Compile the kernel, on a read-only field as a belief's is."""
         field, age_s = frozen_array(np.ones((3, 3), np.float32)), np.zeros((3, 3), np.float32)
-        remember(np.zeros((SLOTS, WIDTH)), np.zeros((0, FOUND)), field, age_s, np.zeros(2), 1.0, 1.0, 0.0)
+        remember(np.zeros((SLOTS, WIDTH)), np.zeros((0, 5)), field, age_s, np.zeros(2), 1.0, 1.0, 0.0)
 
     @property
     def begins(self) -> Mask:
         """Whether what is in a slot is another than at the time before, shape (SLOTS,)."""
-        return np.asarray(self._slots[:, SEEN_S] <= 0.0)
+        return np.asarray(self._slots[:, SEEN_S] == 0.0)
 
     def update(self, found: F64, field: ClearanceField, age_s: F32, elapsed_s: float) -> F64:
         """Return what closes in, slot by slot: what is seen to, or where what was seen to must be by now; shape (SLOTS, 5).
 
         Args:
-            found: what is seen to, the nearest first, shape (n, FOUND), n <= SLOTS.
+            found: what is seen to, the nearest first, shape (n, 5), n <= SLOTS.
             field: the clearance now.
             age_s: since each of its cells was looked at, shape (rows, columns).
             elapsed_s: since the last time.

@@ -12,13 +12,11 @@ from numpy.typing import NDArray
 from drivers.interface.samples import frozen_array
 from estimators.belief import F32, F64, Belief, ClearanceField, Lattice, Mask
 from estimators.memory.rolling import transfer
-from planners.clearance_manifold.boundary_kernels import nearest_closing
 from planners.clearance_manifold.closing import SLOTS, ClosingMemory
 from planners.clearance_manifold.distance_kernels import lowered
-from planners.clearance_manifold.prediction_kernels import Arrival, observe, taken_on_arrival
+from planners.clearance_manifold.prediction_kernels import Arrival, nearest_closing, observe, taken_on_arrival
 from planners.clearance_manifold.recent_rate import RecentRate
 from planners.clearance_manifold.settings import PredictionSettings
-from planners.clearance_manifold.sight_kernels import sight_of
 
 NEVER_S = 1e6  # age of what was never in view
 CLOSING_M_S = 0.25
@@ -54,7 +52,7 @@ class ArrivalField:
         observe(age_s, known, np.zeros(2), 1.0, np.zeros(3), 1.0, (0.0, 0.0, 1.0), 0.0)
         taken = taken_on_arrival(field, field, age_s, np.zeros(2), 1.0, np.zeros(2), self._arrival(0.0))
         lowered(field, taken, 1.0)
-        nearest_closing(field, field, age_s, 0.0, np.zeros(2), 1.0, np.zeros((2, 8)), CLOSING_M_S, SLOTS)
+        nearest_closing(field, field, age_s, 0.0, np.zeros(2), 1.0, np.zeros(2), CLOSING_M_S, SLOTS)
         self._closing.warm_up()
 
     def update(self, belief: Belief) -> Predicted:
@@ -65,11 +63,9 @@ class ArrivalField:
         robot, arrival = np.array([pose.x, pose.y]), self._arrival(belief.twist.speed_m_s)
         cell_m = field.lattice.cell_m
         taken = taken_on_arrival(field.clearance_m, field.rate_m_s, self._age_s, corner, cell_m, robot, arrival)
-        s = self._settings
-        sight = sight_of(pose, math.radians(s.fov_deg), s.near_m, s.range_m)
-        recent = self._recent.update(field, belief.stamp_ns, sight)
-        sights, window_s = np.stack((sight, self._recent.sight_then)), self._recent.window_s(belief.stamp_ns)
-        found = nearest_closing(field.clearance_m, field.rate_m_s, recent, window_s, corner, cell_m, sights, CLOSING_M_S, SLOTS)
+        recent = self._recent.update(field, belief.stamp_ns)
+        window_s = self._recent.window_s(belief.stamp_ns)
+        found = nearest_closing(field.clearance_m, field.rate_m_s, recent, window_s, corner, cell_m, robot, CLOSING_M_S, SLOTS)
         closing = self._closing.update(found, field, self._met_s, elapsed_s)
         return Predicted(lowered(field.clearance_m, taken, cell_m), closing, self._closing.begins)
 

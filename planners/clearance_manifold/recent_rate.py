@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.belief import F32, F64, ClearanceField, Lattice
+from estimators.belief import F32, ClearanceField, Lattice
 from estimators.memory.rolling import transfer
 
 WINDOW_S = 0.2  # the paper's period: at least so long ago, at most twice
@@ -26,17 +26,12 @@ class RecentRate:
         self._lattice: Lattice | None = None  # of both
         self._then: tuple[F32, int] = (np.zeros((0, 0), np.float32), 0)  # (rows, columns), NaN where unknown, and its stamp
         self._next: tuple[F32, int] = self._then  # what follows it
-        self._sights: F64 = np.zeros((2, 8))  # what was in view then and at what follows it (`sight_of`)
 
-    def update(self, field: ClearanceField, stamp_ns: int, sight: F64) -> F32:
-        """Take in a field and what is in view (`sight_of`), shape (8,).
-
-        Return its rate [m/s], shape (rows, columns), NaN where nothing is known of it.
-        """
+    def update(self, field: ClearanceField, stamp_ns: int) -> F32:
+        """Take in a field; return its rate [m/s], shape (rows, columns), NaN where nothing is known of it."""
         now = np.where(field.known, field.clearance_m, np.float32(np.nan))
         if self._lattice is None or self._lattice.cell_m != field.lattice.cell_m:
             self._then = self._next = (now, stamp_ns)
-            self._sights = np.stack((sight, sight))
         elif self._lattice != field.lattice:
             self._then, self._next = (
                 (transfer(kept, self._lattice, field.lattice, np.nan), at) for kept, at in (self._then, self._next)
@@ -44,15 +39,9 @@ class RecentRate:
         self._lattice = field.lattice
         if stamp_ns - self._next[1] >= round(WINDOW_S * SECOND_NS):
             self._then, self._next = self._next, (now, stamp_ns)
-            self._sights = np.stack((self._sights[1], sight))
         kept, at_ns = self._then
         elapsed_s = (stamp_ns - at_ns) / SECOND_NS
         return np.asarray((now - kept) * np.float32(1.0 / elapsed_s if elapsed_s > 0.0 else np.nan))
-
-    @property
-    def sight_then(self) -> F64:
-        """What was in view at the field that the rate is the difference to, shape (8,)."""
-        return np.asarray(self._sights[0])
 
     def window_s(self, stamp_ns: int) -> float:
         """Return over which time before that stamp the rate is taken [s]."""
@@ -65,7 +54,6 @@ class RecentRate:
             "recent_corner": np.zeros(0) if at is None else np.array([at.x_m, at.y_m, at.cell_m]),
             "recent_then": self._then[0],
             "recent_next": self._next[0],
-            "recent_sights": self._sights.copy(),
             "recent_stamps_ns": np.array([self._then[1], self._next[1]], np.int64),
         }
 
@@ -74,6 +62,5 @@ class RecentRate:
         corner = state["recent_corner"].tolist()
         then, after = (np.asarray(state[name], np.float32) for name in ("recent_then", "recent_next"))
         self._lattice = Lattice(*corner, *then.shape) if corner else None
-        self._sights = state["recent_sights"].copy()
         stamps = state["recent_stamps_ns"].tolist()
         self._then, self._next = (then, int(stamps[0])), (after, int(stamps[1]))

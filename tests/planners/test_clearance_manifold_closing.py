@@ -5,17 +5,14 @@ import pytest
 
 from drivers.interface.geometry import SE2
 from estimators.belief import ClearanceField, Lattice
-from planners.clearance_manifold.boundary_kernels import THICK_M, nearest_closing
 from planners.clearance_manifold.branch_kernels import BODY_M, encounters
 from planners.clearance_manifold.control_kernels import known_way
+from planners.clearance_manifold.prediction_kernels import THICK_M, nearest_closing
 from planners.clearance_manifold.recent_rate import WINDOW_S, RecentRate
 from planners.clearance_manifold.ridge_kernels import Sections
-from planners.clearance_manifold.sight_kernels import sight_of
 
 OFFSETS = np.linspace(-1.0, 1.0, 5)
 CELL_M = 0.05
-FROM = sight_of(SE2(0.5, 0.0, 0.0), np.pi, 0.0, 9.0)
-SIGHTS = np.stack((FROM, FROM))
 
 
 def field_of(clearance_m, known=None, corner=(0.0, 0.0)):
@@ -29,7 +26,7 @@ def test_the_recent_rate_has_caught_up_a_window_after_somebody_sets_off(period_s
     rate, still_s = RecentRate(), 1.0
     for tick in range(round(2.0 / period_s)):
         now_s = tick * period_s
-        recent = rate.update(field_of(2.0 - max(0.0, now_s - still_s)), round(now_s * 1e9), FROM)
+        recent = rate.update(field_of(2.0 - max(0.0, now_s - still_s)), round(now_s * 1e9))
         if now_s >= still_s + 2.0 * WINDOW_S:
             assert recent == pytest.approx(np.full((6, 8), -1.0), abs=1e-4)
         elif now_s <= still_s and tick:
@@ -39,8 +36,8 @@ def test_the_recent_rate_has_caught_up_a_window_after_somebody_sets_off(period_s
 def test_the_recent_rate_knows_nothing_of_cells_that_were_not_seen_then_and_moves_with_the_window():
     rate, known = RecentRate(), np.ones((6, 8), np.bool_)
     known[:, 3] = False
-    rate.update(field_of(1.0, known), 0, FROM)
-    recent = rate.update(field_of(0.9, corner=(2 * CELL_M, 0.0)), round(WINDOW_S * 1e9), FROM)
+    rate.update(field_of(1.0, known), 0)
+    recent = rate.update(field_of(0.9, corner=(2 * CELL_M, 0.0)), round(WINDOW_S * 1e9))
     assert np.isnan(recent[:, [1, 6, 7]]).all()  # not seen then, and off the window then
     assert recent[:, [0, 2, 3, 4, 5]] == pytest.approx(np.full((6, 5), -0.5), abs=1e-4)
 
@@ -48,9 +45,9 @@ def test_the_recent_rate_knows_nothing_of_cells_that_were_not_seen_then_and_move
 def test_what_was_taken_in_goes_on_from_a_snapshot():
     rate, other = RecentRate(), RecentRate()
     for k in range(7):
-        rate.update(field_of(1.0 - 0.03 * k), k * 50_000_000, FROM)
+        rate.update(field_of(1.0 - 0.03 * k), k * 50_000_000)
     other.take(rate.state())
-    later = (field_of(0.7), 350_000_000, FROM)
+    later = (field_of(0.7), 350_000_000)
     assert (rate.update(*later) == other.update(*later)).all()
 
 
@@ -70,7 +67,7 @@ def test_who_comes_along_beside_something_is_where_he_is_and_not_where_he_is_see
     before, now = (clearance_beside_a_wall(x_m, 0.0)[:: int(side)] for x_m in (2.2, 2.0))
     rate = (now - before) / np.float32(0.25)
     rate[:, round(2.0 / CELL_M) :] = 0.0  # nothing is seen through him
-    found = nearest_closing(now, rate, rate, 0.25, np.array([0.0, -1.5]), CELL_M, SIGHTS, 0.25, 1)[0]
+    found = nearest_closing(now, rate, rate, 0.25, np.array([0.0, -1.5]), CELL_M, np.array([0.5, 0.0]), 0.25, 1)[0]
     assert found[0] == pytest.approx(2.0, abs=0.1)
     assert found[1] == pytest.approx(0.0, abs=0.03)
 
@@ -83,7 +80,7 @@ def test_the_rate_over_a_window_goes_with_the_slopes_in_the_middle_of_it(step_m)
     recent = (now - before) / np.float32(step_m / 0.8)
     rate = np.where((x < 2.0) & (y < 0.0), recent, np.float32(0.0))
     middle, last = (
-        nearest_closing(now, rate, recent, window_s, np.array([0.0, -1.5]), CELL_M, SIGHTS, 0.25, 1)[0]
+        nearest_closing(now, rate, recent, window_s, np.array([0.0, -1.5]), CELL_M, np.array([0.5, 0.0]), 0.25, 1)[0]
         for window_s in (step_m / 0.8, 0.0)
     )
     assert middle[2:4] == pytest.approx([-0.8, 0.0], abs=0.18)

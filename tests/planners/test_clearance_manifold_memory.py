@@ -5,15 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planners.clearance_manifold.boundary_kernels import FOUND, MOVER_M
 from planners.clearance_manifold.closing import SLOTS, ClosingMemory
-from planners.clearance_manifold.motion_kernels import WIDTH
 from planners.clearance_manifold.prediction import ArrivalField
+from planners.clearance_manifold.prediction_kernels import MOVER_M
 from planners.clearance_manifold.settings import PredictionSettings
-from tests.planners.boundaries import found
 from tests.planners.synthetic import Box, Disc, belief_of
 
-NOBODY = np.zeros((0, FOUND))
+NOBODY = np.zeros((0, 5))
 
 
 def ground(age_s):
@@ -24,7 +22,7 @@ def ground(age_s):
 
 def coming(*at):
     """Return who comes along x with 0.8 m/s, at these places, the nearest first."""
-    return np.array([found(x, y, -0.8, 0.0) for x, y in at])
+    return np.array([[x, y, -0.8, 0.0, 20.0] for x, y in at])
 
 
 def watched(memory, ticks, *ys):
@@ -65,7 +63,7 @@ def test_what_seemed_to_close_in_for_a_moment_only_is_not_carried_on():
     assert memory.update(coming((1.0, 0.5)), field, age, 0.05).any()
     assert not memory.update(NOBODY, field, age, 0.05).any()
     for _ in range(20):  # it has a rate, but stays: a wall seen while turning
-        memory.update(found(1.0, 0.5, -0.3, 0.2)[None], field, age, 0.05)
+        memory.update(np.array([[1.0, 0.5, -0.3, 0.2, 9.0]]), field, age, 0.05)
     assert not memory.update(NOBODY, field, age, 0.05).any()
 
 
@@ -121,7 +119,7 @@ def test_what_is_kept_goes_on_from_a_snapshot_and_does_not_grow():
     other.take(memory.state())
     seen = coming((0.96, 0.5))
     assert (memory.update(seen, field, age, 0.05) == other.update(seen, field, age, 0.05)).all()
-    assert memory.state()["closing"].shape == (SLOTS, WIDTH)
+    assert memory.state()["closing"].shape == (SLOTS, 10)
 
 
 def test_boundaries_apart_are_found_apart_the_nearest_first():

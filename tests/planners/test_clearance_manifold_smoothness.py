@@ -1,10 +1,11 @@
-"""What the clearance-manifold planner asks for is smooth, and P4 is the same at every rate."""
+"""What the clearance-manifold planner asks for is smooth, what closes in on it is steady, and P4 is the same at every rate."""
 
 import numpy as np
 import pytest
 
 from drivers.interface.commands import BodyTwist
 from drivers.interface.geometry import SE2
+from planners.clearance_manifold.closing import ClosingMemory
 from planners.clearance_manifold.drift import Drift, Past
 from planners.clearance_manifold.governor import Around, Governor, Motion, approach
 from planners.clearance_manifold.governor_kernels import followed, jerk_to_move, jerk_to_pass, jerk_to_stop, room_along
@@ -98,6 +99,22 @@ def test_who_is_kept_from_what_was_asked_goes_on_from_what_he_does():
     for _ in range(100):
         asked = governor.follow(np.array([0.5, 0.0]), held, around, 0.8)
     assert asked[0] < SmoothnessSettings().slip_m_s + 0.05 * OMNI.acceleration.vx  # and what it gains in a tick
+
+
+@pytest.mark.parametrize("speed", [0.6, 1.2])
+def test_the_end_of_a_wall_stops_closing_in_and_a_walker_does_not(speed):
+    """Both are first seen with the same rate; the wall's fades as it is smoothed, and its middle stays."""
+    rng = np.random.default_rng(3)
+    field = belief_of([]).clearance
+    age = np.zeros(field.known.shape, np.float32)
+    wall, walker = ClosingMemory(1.0), ClosingMemory(1.0)
+    for tick in range(12):
+        noise = rng.normal(0.0, 0.04, 2)
+        ends = np.array([2.0 + noise[0], 1.4 + noise[1], 0.0, -speed * np.exp(-0.05 * tick / 0.56), 20.0])
+        comes = np.array([2.0 + noise[0], 1.4 - 0.05 * speed * tick + noise[1], 0.0, -1.5 * speed, 20.0])  # a rate too high
+        still, moves = (memory.update(seen[None], field, age, 0.05)[0] for memory, seen in ((wall, ends), (walker, comes)))
+    assert np.hypot(*still[2:4]) < 0.45 * speed * np.exp(-0.05 * 11 / 0.56)
+    assert moves[3] == pytest.approx(-speed, rel=0.35)
 
 
 @pytest.mark.parametrize("period_ms", [20, 50, 200])

@@ -22,10 +22,10 @@ BLOCKED = Route(GOAL, no_path(), 0.0, blocked=True)
 
 
 class Robot:
-    """Turns as it is told, and sees all around."""
+    """Turns as it is told."""
 
     def __init__(self, limits: BaseLimits = OMNI, **settings: float | str) -> None:
-        chosen = ClearanceManifoldSettings(waiting=settings, prediction={"fov_deg": 360.0, "range_m": 6.0})
+        chosen = ClearanceManifoldSettings(waiting=settings)
         self.planner = ClearanceManifold(chosen, PlannerSetup(PERIOD_S, RADIUS_M, limits, 0))
         self.pose, self.tick = SE2(), 0
         self.twist = BodyTwist()
