@@ -46,6 +46,7 @@ class GridRouter:
         way_to((1, 1), cheapest(np.ones((2, 2)), (0, 0), 1.0), np.ones((2, 2)), 1.0)
         pull_straight(np.zeros((2, 2)), np.ones((2, 2)))
         near_cells(np.zeros(1, np.int64), np.zeros(1, np.int64), 1, 2, 2)
+        remainder_outside(np.zeros((1, 2)), ring(1, 1)[2], np.zeros(2), np.ones(2), np.full(2, 2.0))
         static_field.warm_up(frozen_array(np.zeros((2, 2), np.uint8)))
 
     def route(self, belief: Belief, mission: Mission) -> Route:

@@ -7,11 +7,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.interface.kernel import kernel
 from estimators.belief import Lattice
 
 F64 = NDArray[np.float64]
-
-_NEXT, _BEFORE = np.array([1, 2, 3, 0]), np.array([3, 0, 1, 2])  # of the four corners, or sides
 
 
 def around(lattice: Lattice, point: F64, reach_m: float) -> tuple[NDArray[np.intp], NDArray[np.intp], F64]:
@@ -43,6 +42,7 @@ def ring(rows: int, columns: int) -> tuple[NDArray[np.intp], NDArray[np.intp], N
     return row, column, side
 
 
+@kernel()
 def remainder_outside(points: F64, side: NDArray[np.intp], low: F64, high: F64, goal: F64) -> F64:
     """Return the shortest way from border points to the goal that stays outside the window, shape (n,) [m].
 
@@ -58,12 +58,24 @@ def remainder_outside(points: F64, side: NDArray[np.intp], low: F64, high: F64, 
     """
     corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
     faces = np.array([goal[1] < low[1], goal[0] > high[0], goal[1] > high[1], goal[0] < low[0]])
-    edge = np.hypot(*(corners[_NEXT] - corners).T)  # of side k, from corner k to corner k + 1
-    corner = np.where(faces | faces[_BEFORE], np.hypot(*(corners - goal).T), np.inf)
+    left = np.full(4, np.inf)  # from each corner
+    for k in range(4):
+        if faces[k] or faces[k - 1]:
+            left[k] = np.hypot(corners[k, 0] - goal[0], corners[k, 1] - goal[1])
     for _ in range(2):  # no corner is farther than two edges from one that sees the goal
-        corner = np.minimum(corner, np.minimum(corner[_NEXT] + edge, (corner + edge)[_BEFORE]))
-    after = _NEXT[side]
-    round_corners = np.minimum(
-        np.hypot(*(points - corners[side]).T) + corner[side], np.hypot(*(points - corners[after]).T) + corner[after]
-    )
-    return np.asarray(np.where(faces[side], np.hypot(*(points - goal).T), round_corners), dtype=np.float64)
+        before = left.copy()
+        for k in range(4):
+            after = (k + 1) % 4  # side k, from corner k to that after it
+            edge = np.hypot(corners[after, 0] - corners[k, 0], corners[after, 1] - corners[k, 1])
+            left[k] = min(left[k], before[after] + edge)
+            left[after] = min(left[after], before[k] + edge)
+    remainder = np.empty(len(points))
+    for i in range(len(points)):
+        k, after = side[i], (side[i] + 1) % 4
+        x, y = points[i, 0], points[i, 1]
+        if faces[k]:
+            remainder[i] = np.hypot(x - goal[0], y - goal[1])
+        else:
+            back = np.hypot(x - corners[k, 0], y - corners[k, 1]) + left[k]
+            remainder[i] = min(back, np.hypot(x - corners[after, 0], y - corners[after, 1]) + left[after])
+    return remainder
