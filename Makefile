@@ -32,7 +32,7 @@ picture: $(STAMP)  ## make the README's pictures (needs a Vulkan driver; a softw
 	$(BIN)/trundle review runs/waiting.rrd --at 140 --screenshot docs/waiting.png
 
 test: lint  ## what CI runs: format, lint, types, layers, tests
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist loadfile  # a file's tests share what the first compiles
 
 lint: $(STAMP)  ## format, lint, types and layer contracts only
 	$(BIN)/ruff format --check .
