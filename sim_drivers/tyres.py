@@ -9,7 +9,7 @@ the weight only, without friction, and what holds tyres along the floor is a for
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -24,6 +24,16 @@ I64 = NDArray[np.int64]
 CREEP_M_S = 0.1  # a tyre that slips so fast holds with 0.71 of all its grip; rubber at walking pace: a slip of 0.1 to 0.2
 
 
+class _Arrays(NamedTuple):
+    """The compiled world's own, looked up once: they change as it goes on.  `hold` says what they are."""
+
+    motion: F64  # (bodies, 6)
+    centre: F64  # (3,)
+    place: F64  # (bodies, 3)
+    sensed: F64  # (numbers of all sensors,)
+    applied: F64  # (bodies, 6)
+
+
 class Tyres:
     """The tyres of a base, a part of the world: at every step they are told their load, and hold."""
 
@@ -34,8 +44,7 @@ class Tyres:
         """Take the names of the wheels' bodies, which stand in the model before `build`."""
         self._wheels, self._friction = tuple(wheels), friction
         self._bodies, self._loads = np.zeros(0, np.int64), np.zeros(0, np.int64)
-        nothing = np.zeros(0)  # what follows are the compiled world's own arrays
-        self._sensed, self._centre, self._motion, self._place, self._applied = nothing, nothing, nothing, nothing, nothing
+        self._at: _Arrays | None = None
 
     def build(self, spec: Any, base: Any) -> None:
         """Let MuJoCo tell each wheel's load.  The sensor's place is larger than the wheel: all its contacts count."""
@@ -53,13 +62,13 @@ class Tyres:
         self._bodies = np.array([model.body(name).id for name in self._wheels], np.int64)
         self._loads = np.array([model.sensor(f"{name}_load").adr[0] for name in self._wheels], np.int64)
         data, root = world.data, int(model.body_rootid[self._bodies[0]])
-        self._sensed, self._centre = data.sensordata, data.subtree_com[root]
-        self._motion, self._place, self._applied = data.cvel, data.xpos, data.xfrc_applied
+        self._at = _Arrays(data.cvel, data.subtree_com[root], data.xpos, data.sensordata, data.xfrc_applied)
 
     def act(self, world: MujocoWorld) -> None:
         """Hold for the next step as the velocities now, and the loads of the step before, have it."""
-        load_n = self._sensed[self._loads]
-        hold(self._bodies, self._motion, self._centre, self._place, load_n, self._friction, self._applied)
+        at = self._at
+        assert at is not None  # bound before the world acts
+        hold(self._bodies, at.motion, at.centre, at.place, at.sensed[self._loads], self._friction, at.applied)
 
 
 @kernel()
