@@ -31,8 +31,9 @@ picture: $(STAMP)  ## make the README's pictures (needs a Vulkan driver; a softw
 	$(BIN)/trundle run dynamic_bottleneck --seed 4 --set planner.name=rcsp --log runs/waiting.rrd --force
 	$(BIN)/trundle review runs/waiting.rrd --at 140 --screenshot docs/waiting.png
 
+# The tests of a file run in one process: they share the kernels that the first of them compiles.
 test: lint  ## what CI runs: format, lint, types, layers, tests
-	$(BIN)/python -m pytest -n 2 --dist loadfile  # a file's tests share what the first compiles
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 lint: $(STAMP)  ## format, lint, types and layer contracts only
 	$(BIN)/ruff format --check .

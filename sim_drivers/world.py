@@ -35,7 +35,7 @@ class Part(Protocol):
 
     @property
     def period_ns(self) -> int:
-        """How often `act` wants to be called; a whole multiple of the physics step is best, others are rounded up to it."""
+        """How often `act` is to be called, asked once; whole multiples of the physics step are best, others are rounded up."""
         ...
 
     def act(self, world: MujocoWorld) -> None:

@@ -60,7 +60,7 @@ def remainder_outside(points: F64, side: NDArray[np.intp], low: F64, high: F64, 
     faces = np.array([goal[1] < low[1], goal[0] > high[0], goal[1] > high[1], goal[0] < low[0]])
     left = np.full(4, np.inf)  # from each corner
     for k in range(4):
-        if faces[k] or faces[k - 1]:
+        if faces[k] or faces[k - 1]:  # the sides that meet there; before the first is the last
             left[k] = np.hypot(corners[k, 0] - goal[0], corners[k, 1] - goal[1])
     for _ in range(2):  # no corner is farther than two edges from one that sees the goal
         before = left.copy()
