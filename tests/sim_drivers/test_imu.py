@@ -129,6 +129,12 @@ def test_it_saturates_and_counts_in_whole_steps():
     assert spoilt.tolist() == pytest.approx([0.5, -1.0, 2.0, 1.23, -5.0, 0.0], abs=1e-12)
 
 
+def test_what_is_not_a_number_is_not_hidden_by_saturation():
+    truth = np.array((np.nan, 0.1, np.inf, 1.0, -np.inf, np.nan))
+    spoilt = ImuNoise(ImuNoiseSettings(), 200.0, 1, "imu").spoil(truth, 0)
+    assert np.isnan(spoilt).tolist() == [True, False, False, False, False, True]
+
+
 def test_same_seed_same_samples():
     first, again, other = (measured(seed=seed)[0] for seed in (1, 1, 2))
     assert first == again
